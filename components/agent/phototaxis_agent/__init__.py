@@ -1,0 +1,1 @@
+"""The learning agent: the loop around a learner."""

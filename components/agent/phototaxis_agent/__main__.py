@@ -1,0 +1,44 @@
+"""`phototaxis agent`: a learner as a process."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta
+from phototaxis.bus import Bus
+from phototaxis.component import ComponentOptions, entry, run
+from phototaxis.errors import UserError
+
+from phototaxis_agent.server import Server
+from phototaxis_agent.setup import parse_setup
+
+
+class Options(ComponentOptions, kw_only=True):
+    """Options of the agent process."""
+
+    checkpoint: str = ""
+    """file to keep the learner's state in (.npz)"""
+    resume: str = ""
+    """checkpoint to begin with"""
+    agent_seed: Annotated[int, Meta(ge=0)] | None = None
+    """seed of the learner and its exploration (default: the run's)"""
+    restarted: bool = False
+    """this process replaces one that died: continue from its checkpoint and journal, if there are any"""
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    options, setup = parse_setup(Options, argv, "phototaxis agent", "Run a learner that drives the robot.")
+    path = Path(options.checkpoint) if options.checkpoint else None
+    if path is not None and not path.parent.is_dir():
+        raise UserError(f"--checkpoint {path}: there is no folder {path.parent}")
+    resume = Path(options.resume) if options.resume else path if options.restarted else None
+
+    def serve(bus: Bus) -> None:
+        make = lambda world: setup.agent(world, seed=options.agent_seed)  # noqa: E731
+        Server(bus, make, path, resume, required=bool(options.resume)).serve()
+
+    run("agent", options, serve, label=setup.learner)
+
+
+if __name__ == "__main__":
+    entry(main)

@@ -1,0 +1,187 @@
+"""The action-perception loop around a learner (section 5.1 and figure 7 of the paper)."""
+
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from phototaxis.checkpoint import Meta, learner_hash
+from phototaxis.errors import UserError
+from phototaxis.messages import Command, End, Readings
+from phototaxis.task import ACTIONS, PERCEPTS, Memory, TaskOptions, lit
+
+from phototaxis_agent.exploration import Exploration, draw
+from phototaxis_agent.learner import Learner, Transition, find
+
+_INDEX = {motors: index for index, motors in enumerate(ACTIONS)}
+
+
+class Step(NamedTuple):
+    """What one tick was for the agent: for the recording, not for control."""
+
+    percept: int
+    action: int
+    reward: float
+    td_error: float
+    temperature: float
+
+
+class Agent:
+    """Turns readings into commands and learns from what they led to.
+
+    Parameters
+    ----------
+    learner : name of a learner.
+    options : its hyperparameters, an instance of its `Options`; None for the defaults.
+    task, exploration : what is learned and how actions are drawn.
+    near : obstacle threshold of the arena, m.
+    seed : of all the agent's randomness.
+    budget : learning steps that the temperature's decay is spread over.
+    learning : False freezes the policy (the temperature is then the final one).
+
+    The action that is learned from is the one that the readings say was applied, whoever chose it, so
+    that an agent may also learn from another's driving; a command that is not one of the nine breaks
+    the chain and nothing is learned from that step.
+    """
+
+    def __init__(
+        self,
+        learner: str,
+        options: Any,
+        task: TaskOptions,
+        exploration: Exploration,
+        *,
+        near: float,
+        seed: int,
+        budget: int,
+        learning: bool = True,
+        arena: str = "",
+    ):
+        kind: type[Learner] = find(learner)
+        self.name, self.author, self.arena = learner, learner, arena
+        self.task, self.exploration, self.budget = task, exploration, budget
+        self.percept = PERCEPTS[task.percept]
+        self.learning = learning
+        self.epoch = 0
+        self.last = Step(0, -1, 0.0, 0.0, 0.0)
+        self._options = kind.Options() if options is None else options
+        self._rng = np.random.default_rng((seed, 0xA6E47))
+        self.learner: Learner = kind(self._options, self.percept, self._rng)
+        self._reward = task.scheme()
+        self._near = near
+        self._memory = Memory()
+        self._strides = _strides(self.percept.sizes)
+        self.visits = np.zeros(int(np.prod(self.percept.sizes)), np.int64)
+        self._run, self._tick, self._episode, self._steps = "", -1, -1, 0
+        self._state: tuple[int, ...] | None = None
+        self._brightest = 0.0
+
+    def __call__(self, readings: Readings) -> Command:
+        """Answer one tick: perceive, learn from the last action, choose the next."""
+        if readings.run != self._run or readings.episode != self._episode or readings.tick != self._tick + 1:
+            self._memory.clear()
+            self._state, self._steps = None, 0
+            self._run, self._episode = readings.run, readings.episode
+        self._tick = readings.tick
+        unchanged = self._memory.unchanged(readings)
+        state = self.percept.state(readings, unchanged, self._near)
+        number = sum(map(int.__mul__, state, self._strides))
+        self.visits[number] += 1
+        done = lit(readings)
+        reward = error = 0.0
+        if self._state is not None:
+            self._steps += 1
+            reward = self._reward(self._brightest, readings, unchanged)
+            applied = _INDEX.get((readings.left, readings.right)) if readings.author else None
+            if self.learning and applied is not None:
+                error = self.learner.learn(Transition(self._state, applied, reward, state, done))
+                self.epoch += 1
+        self._state, self._brightest = state, max(readings.light)
+        temperature = self.exploration.temperature(self.epoch, self.budget) if self.learning else self.exploration.cold
+        end: End = "reached" if done else "cap" if self._steps >= self.task.cap else ""
+        action, (left, right) = -1, (0.0, 0.0)
+        if not end:
+            action = self.percept.actions[draw(self.learner.values(state), temperature, self._rng.random())]
+            left, right = ACTIONS[action]
+        self.last = Step(number, action, reward, error, temperature)
+        return Command(readings.run, readings.tick, self.author, left, right, end)
+
+    def table(self) -> list[float]:
+        """Q of every state and action, flattened row by row, 9 a row; 0 where an action is not allowed."""
+        rows = np.zeros((len(self.visits), len(ACTIONS)))
+        allowed = list(self.percept.actions)
+        for number, state in enumerate(np.ndindex(*self.percept.sizes)):
+            rows[number, allowed] = self.learner.values(state)
+        return rows.ravel().tolist()
+
+    def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
+        """Everything needed to continue bit for bit."""
+        arrays = {**self.learner.save()}
+        digest = learner_hash(arrays)
+        meta = Meta(
+            learner=self.name,
+            percept=self.task.percept,
+            reward=self.task.reward,
+            cap=self.task.cap,
+            hyperparameters=msgspec.to_builtins(self._options),
+            exploration=msgspec.to_builtins(self.exploration),
+            budget=self.budget,
+            run=self._run,
+            tick=self._tick,
+            episode=self._episode,
+            epoch=self.epoch,
+            steps=self._steps,
+            lights=list(self._memory.lights),
+            state=self._state or (),
+            brightest=self._brightest,
+            random=_map_numbers(str, self._rng.bit_generator.state),
+            visits=self.visits.tolist(),
+            arena=self.arena,
+            learner_hash=digest,
+        )
+        return meta, arrays
+
+    def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
+        """Continue from a checkpoint; in another run what was learned counts, the percept's history does not.
+
+        Raises
+        ------
+        UserError
+            when the checkpoint is of another learner or percept; `source` names it.
+        """
+        for what, ours, theirs in (
+            ("learner", self.name, meta.learner),
+            ("percept", self.task.percept, meta.percept),
+        ):
+            if ours != theirs:
+                raise UserError(f"{source}: a checkpoint of the {what} '{theirs}', but '{ours}' is asked for")
+        try:
+            self.learner.load(arrays)
+            self._rng.bit_generator.state = _map_numbers(_number, meta.random)
+            self.visits[:] = meta.visits
+        except (KeyError, TypeError, ValueError) as error:
+            raise UserError(f"{source}: does not fit the {self.name} learner: {error}") from None
+        self.epoch = meta.epoch
+        self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
+        self._memory.lights.extend(meta.lights)
+        self._state, self._brightest = meta.state or None, meta.brightest
+
+    @property
+    def tick(self) -> tuple[str, int]:
+        """Run and tick of the last answer."""
+        return self._run, self._tick
+
+
+def _strides(sizes: tuple[int, ...]) -> list[int]:
+    """Weights that turn a state into its number."""
+    return [int(np.prod(sizes[i + 1 :])) for i in range(len(sizes))]
+
+
+def _map_numbers(change: Any, value: Any) -> Any:
+    """A random generator's state with its numbers as text, or back: they exceed 64 bits."""
+    if isinstance(value, dict):
+        return {key: _map_numbers(change, item) for key, item in value.items()}
+    return change(value) if isinstance(value, (int, str)) and not isinstance(value, bool) else value
+
+
+def _number(text: Any) -> Any:
+    return int(text) if isinstance(text, str) and text.lstrip("-").isdigit() else text

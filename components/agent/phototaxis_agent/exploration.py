@@ -1,0 +1,41 @@
+"""Boltzmann exploration with a decaying temperature (equation 2 and section 4.3 of the paper)."""
+
+import math
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+
+class Exploration(Struct, frozen=True, kw_only=True):
+    """How actions are drawn, and how the draw gets greedier.
+
+    The temperature falls geometrically from `hot` to `cold` over the share `cooling` of the budget and
+    stays there.
+    """
+
+    hot: Annotated[float, Meta(gt=0, le=100)] = 0.3
+    """temperature T of equation 2 at the first epoch"""
+    cold: Annotated[float, Meta(gt=0, le=100)] = 0.05
+    """temperature T at the end, and while a policy is evaluated"""
+    cooling: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    """share of the epochs after which the temperature has reached `cold`"""
+
+    def temperature(self, epoch: int, budget: int) -> float:
+        """T at an epoch of a budget of epochs."""
+        progress = epoch / (self.cooling * budget) if budget else 1.0
+        return self.cold if progress >= 1 else self.hot * (self.cold / self.hot) ** progress
+
+
+def draw(values: list[float], temperature: float, uniform: float) -> int:
+    """Equation 2: the index of a value, drawn with probability ∝ exp(value / temperature).
+
+    `uniform` is a random number in 0..1.
+    """
+    best = max(values)
+    weights = [math.exp((value - best) / temperature) for value in values]
+    threshold = uniform * sum(weights)
+    for index, weight in enumerate(weights):
+        threshold -= weight
+        if threshold < 0:
+            return index
+    return len(weights) - 1

@@ -1,0 +1,73 @@
+"""From a command line to an agent: the same options over the bus and in one process."""
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from msgspec import Meta, Struct
+from phototaxis.messages import World
+from phototaxis.options import parse_groups, peek
+from phototaxis.task import TaskOptions
+
+from phototaxis_agent.agent import Agent
+from phototaxis_agent.exploration import Exploration
+from phototaxis_agent.learner import find
+
+
+class LearnerOptions(Struct, kw_only=True):
+    """Which learner."""
+
+    learner: str = "qtable"
+    """name of the learner"""
+
+
+class Setup(Struct):
+    """Everything that defines an agent but the world and the seed."""
+
+    learner: str
+    hyperparameters: Any
+    task: TaskOptions
+    exploration: Exploration
+
+    def agent(
+        self, world: World, *, seed: int | None = None, budget: int | None = None, learning: bool = True
+    ) -> Agent:
+        """An agent for a world; `seed` and `budget` are the world's unless they are given."""
+        return Agent(
+            self.learner,
+            self.hyperparameters,
+            self.task,
+            self.exploration,
+            near=world.arena.sensing.near,
+            seed=world.seed if seed is None else seed,
+            budget=budget or world.epochs or DEFAULT_BUDGET,
+            learning=learning,
+            arena=world.arena.name,
+        )
+
+
+DEFAULT_BUDGET = 3000
+"""Epochs that the temperature's decay is spread over in a run without an end."""
+
+Epochs = Annotated[int, Meta(ge=0)]
+
+
+def parse_setup(struct: type[Any], argv: Sequence[str] | None, prog: str, about: str) -> tuple[Any, Setup]:
+    """Read a command's own options together with the agent's; the learner's own are known by its name.
+
+    Raises
+    ------
+    UserError
+        for an unknown learner or a value that does not fit.
+    """
+    words = sys.argv[1:] if argv is None else argv
+    name = peek(words, "--learner", LearnerOptions().learner)
+    groups = {
+        "": struct,
+        "learner": LearnerOptions,
+        "task": TaskOptions,
+        "exploration": Exploration,
+        f"hyperparameters of {name}": find(name).Options,
+    }
+    own, chosen, task, exploration, hyperparameters = parse_groups(groups, words, prog, about)
+    return own, Setup(chosen.learner, hyperparameters, task, exploration)

@@ -1,0 +1,166 @@
+"""A component's place on the bus: what it writes, what it reads, and who is alive, as one inbox.
+
+Zenoh's callbacks only put into the inbox; everything else happens in the component's own thread, so a
+component is one loop without locks. Payloads are decoded there; what does not decode is refused and
+counted, and the loop goes on.
+"""
+
+import sys
+from collections import Counter
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+from typing import Any, NamedTuple
+
+import zenoh
+from zenoh.handlers import Callback
+
+from phototaxis.messages import ControlReply, Decoder, LogRequest, Message, Refused, encode
+from phototaxis.topics import ROLES, TOPICS, Topic, alive_key
+
+REQUESTS: dict[str, type[Message]] = {"log": LogRequest}
+REPLY_LIMIT = 16_384
+
+
+class Event(NamedTuple):
+    """One thing that happened: a message or a request on a topic, a token, or the order to stop."""
+
+    topic: str
+    """A topic's name, "alive", "gone" or "stop"."""
+    message: Any = None
+    """The decoded message; for "alive" and "gone" the (role, id) of the component."""
+    reply: Callable[[Message | bytes], None] | None = None
+    """For a request: sends one reply (may be called several times)."""
+
+
+class Bus:
+    """The topics of one world as one component sees them.
+
+    Parameters
+    ----------
+    session : an open Zenoh session; the caller closes it.
+    name : prefix of the world's keys.
+    role : a key of `ROLES`; says which topics are written and read.
+    ident : unique name of this component, shown in its liveliness token.
+    """
+
+    def __init__(self, session: zenoh.Session, name: str, role: str, ident: str):
+        self.role, self.ident, self._session, self._name = role, ident, session, name
+        self.refused: Counter[str] = Counter()
+        self._inbox: SimpleQueue[tuple[str, Any]] = SimpleQueue()
+        self._decoders: dict[str, Decoder[Any]] = {}
+        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._declared: list[Any] = []
+        reads = ROLES[role].reads
+        for topic in TOPICS.values():
+            if topic.name in reads:
+                self._subscribe(topic)
+            if topic.writer == role:
+                self._offer(topic)
+        watch = self._callback("token")
+        self._declared.append(
+            session.liveliness().declare_subscriber(alive_key(name, "*", "*"), watch, history=True)
+        )
+        self._declared.append(session.liveliness().declare_token(alive_key(name, role, ident)))
+
+    def put(self, topic: str, message: Message | bytes) -> None:
+        """Publish one message (or one that is encoded already)."""
+        self._publishers[topic].put(message if isinstance(message, bytes) else encode(message))
+
+    def receive(self, timeout: float | None = None) -> Event | None:
+        """The next event; None when `timeout` seconds brought nothing, or something that was refused."""
+        try:
+            source, item = self._inbox.get(timeout=timeout)
+        except Empty:
+            return None
+        if source == "stop":
+            return Event("stop")
+        if source == "token":
+            _, role, ident = str(item.key_expr).rsplit("/", 2)
+            return Event("alive" if item.kind == zenoh.SampleKind.PUT else "gone", (role, ident))
+        try:
+            if isinstance(item, zenoh.Query):
+                return self._request(source, item)
+            return Event(source, self._decoders[source](item.payload.to_bytes()))
+        except Refused as why:
+            self.refuse(source, str(why))
+            return None
+
+    def stop(self) -> None:
+        """Make `receive` return a "stop" event; may be called from a signal handler or another thread."""
+        self._inbox.put(("stop", None))
+
+    def refuse(self, topic: str, why: str) -> None:
+        """Count a message that is not accepted; the first of each reason is told on stderr."""
+        reason = f"{topic}: {why.split(':')[0]}"
+        if not self.refused[reason]:
+            print(f"{self.role}: refused a message on {topic}: {why}", file=sys.stderr, flush=True)
+        self.refused[reason] += 1
+
+    def ask(self, topic: str, request: Message | None = None, timeout: float = 2.0) -> list[bytes]:
+        """The replies to a query on a topic, in the order in which they came; [] when nobody answered."""
+        replies = self._session.get(
+            TOPICS[topic].key(self._name),
+            payload=None if request is None else encode(request),
+            timeout=timeout,
+            consolidation=zenoh.ConsolidationMode.NONE,
+        )
+        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+
+    def ask_one(self, topic: str, kind: type[Any], request: Message | None = None, timeout: float = 2.0) -> Any:
+        """The first valid reply as a message, or None."""
+        limit = TOPICS[topic].limit if request is None else REPLY_LIMIT
+        for payload in self.ask(topic, request, timeout):
+            try:
+                return Decoder(kind, limit)(payload)
+            except Refused as why:
+                self.refuse(topic, str(why))
+        return None
+
+    def control(self, request: Message, timeout: float = 2.0) -> ControlReply | None:
+        """Ask the simulation for something; None when it did not answer."""
+        return self.ask_one("control", ControlReply, request, timeout)
+
+    def close(self) -> None:
+        """Take back what was declared, the token last."""
+        for declared in self._declared:
+            declared.undeclare()
+        for publisher in self._publishers.values():
+            publisher.undeclare()
+
+    def __enter__(self) -> "Bus":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _subscribe(self, topic: Topic) -> None:
+        self._decoders[topic.name] = Decoder(topic.message, topic.limit)
+        key = topic.key(self._name)
+        self._declared.append(self._session.declare_subscriber(key, self._callback(topic.name)))
+
+    def _offer(self, topic: Topic) -> None:
+        key = topic.key(self._name)
+        if topic.kind in ("stream", "log"):
+            steady = topic.kind == "stream"
+            self._publishers[topic.name] = self._session.declare_publisher(
+                key,
+                congestion_control=zenoh.CongestionControl.BLOCK if steady else zenoh.CongestionControl.DROP,
+                express=steady,
+            )
+        if topic.kind in ("retained", "log", "query"):
+            self._declared.append(self._session.declare_queryable(key, self._callback(topic.name), complete=True))
+
+    def _callback(self, source: str) -> Any:
+        put = self._inbox.put
+        return Callback(lambda item: put((source, item)), indirect=False)
+
+    def _request(self, source: str, query: zenoh.Query) -> Event:
+        topic = TOPICS[source]
+        kind = topic.message if topic.kind == "query" else REQUESTS.get(topic.kind)
+        payload = b"" if query.payload is None else query.payload.to_bytes()
+        message = Decoder(kind, topic.limit)(payload) if kind and payload else None
+
+        def reply(answer: Message | bytes) -> None:
+            query.reply(query.key_expr, answer if isinstance(answer, bytes) else encode(answer))
+
+        return Event(source, message, reply)

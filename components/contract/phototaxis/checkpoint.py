@@ -1,0 +1,100 @@
+"""A learner's whole state on disk: complete, written atomically, safe to load.
+
+The file is a NumPy .npz without pickles: the learner's arrays, and `meta`, the rest as JSON bytes.
+"""
+
+import hashlib
+import io
+import os
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+
+from phototaxis.errors import UserError
+
+FORMAT = 1
+_LIMIT = 1_000_000_000
+
+
+class Meta(Struct, forbid_unknown_fields=True, kw_only=True):
+    """Everything about an agent but its learner's arrays."""
+
+    format: int = FORMAT
+    learner: str
+    percept: str
+    reward: str
+    cap: int
+    hyperparameters: dict[str, Any]
+    exploration: dict[str, Any]
+    budget: int
+    """Learning steps that the temperature's decay is spread over."""
+    run: str
+    tick: int
+    """The last tick that was answered; −1 for none."""
+    episode: int
+    epoch: int
+    steps: int
+    lights: list[tuple[float, float]]
+    """The percept's history."""
+    state: tuple[int, ...]
+    """The last percept, and the larger light reading that went with it."""
+    brightest: float
+    random: dict[str, Any]
+    """State of the random generator, its large numbers as text."""
+    visits: list[int]
+    """How often each percept was met."""
+    arena: str
+    learner_hash: str
+
+
+def learner_hash(arrays: dict[str, np.ndarray]) -> str:
+    """A digest of what was learned: names, types, shapes and bytes of the arrays."""
+    digest = hashlib.blake2b(digest_size=8)
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def save(path: Path, meta: Meta, arrays: dict[str, np.ndarray]) -> None:
+    """Write a checkpoint; a reader sees the old file or the new one, never a part."""
+    buffer = io.BytesIO()
+    named: dict[str, Any] = {"meta": np.frombuffer(msgspec.json.encode(meta), np.uint8), **arrays}
+    np.savez(buffer, **named)
+    fresh = path.with_suffix(path.suffix + ".new")
+    fresh.write_bytes(buffer.getbuffer())
+    os.replace(fresh, path)
+
+
+def load(path: Path) -> tuple[Meta, dict[str, np.ndarray]]:
+    """Read a checkpoint.
+
+    Raises
+    ------
+    UserError
+        when the file is missing, truncated, too large, or not a checkpoint of this format.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > _LIMIT:
+                raise UserError(f"{path}: unpacks to more than {_LIMIT} bytes, not loaded")
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        meta = msgspec.json.decode(arrays.pop("meta").tobytes(), type=Meta)
+    except FileNotFoundError:
+        raise UserError(f"{path}: no such checkpoint") from None
+    except (zipfile.BadZipFile, EOFError, zlib.error) as error:
+        raise UserError(f"{path}: not a checkpoint, or truncated: {error}") from None
+    except (KeyError, ValueError, OSError, msgspec.MsgspecError) as error:
+        raise UserError(f"{path}: not a Phototaxis checkpoint: {error}") from None
+    if meta.format != FORMAT:
+        raise UserError(f"{path}: checkpoint format {meta.format}, this version reads {FORMAT}")
+    if learner_hash(arrays) != meta.learner_hash:
+        raise UserError(f"{path}: the contents do not match their hash; the file is damaged")
+    return meta, arrays

@@ -1,0 +1,59 @@
+"""What a component wants recorded, published in chunks beside the tick path.
+
+Rows are gathered and sent as columns, 16 ticks or 50 ms at a time, on a key that drops under pressure;
+the newest chunks are kept so that a recorder that missed some, or came late, can ask for them.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from phototaxis.bus import Bus, Event
+from phototaxis.messages import LogRequest, Message, encode
+
+ROWS, SECONDS, KEPT = 16, 0.05, 2048
+
+
+class Chunks:
+    """Gathers rows and publishes them on one log topic.
+
+    `make(seq, columns)` builds the message from the transposed rows.
+    """
+
+    def __init__(self, bus: Bus, topic: str, make: Callable[[int, list[Any]], Message]):
+        self._bus, self._topic, self._make = bus, topic, make
+        self._rows: list[tuple[Any, ...]] = []
+        self._kept: deque[tuple[int, bytes]] = deque(maxlen=KEPT)
+        self._seq = 0
+        self._since = 0.0
+
+    def add(self, row: tuple[Any, ...], now: float) -> None:
+        """Add one tick's row; a full chunk is sent."""
+        if not self._rows:
+            self._since = now
+        self._rows.append(row)
+        if len(self._rows) >= ROWS:
+            self.flush()
+
+    def poll(self, now: float) -> None:
+        """Send a chunk that has waited long enough."""
+        if self._rows and now - self._since >= SECONDS:
+            self.flush()
+
+    def flush(self) -> None:
+        """Send what there is."""
+        if self._rows:
+            payload = encode(self._make(self._seq, list(zip(*self._rows, strict=True))))
+            self._rows.clear()
+            self._kept.append((self._seq, payload))
+            self._seq += 1
+            self._bus.put(self._topic, payload)
+
+    def answer(self, request: Event) -> None:
+        """Answer a recorder's request with every kept chunk from its `seq` on, the newest rows included."""
+        self.flush()
+        first = request.message.seq if isinstance(request.message, LogRequest) else 0
+        if request.reply is not None:
+            for seq, payload in self._kept:
+                if seq >= first:
+                    request.reply(payload)

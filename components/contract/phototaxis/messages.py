@@ -1,0 +1,276 @@
+"""The messages of the bus: typed, validated on arrival, MessagePack on the wire and JSON accepted.
+
+Units are metres, radians and seconds. `(run, tick)` names everything that belongs to one step; ticks
+increase for the whole life of a run. Encoded, every message is a map that carries `schema`.
+"""
+
+from typing import Annotated, Any, Generic, Literal, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct, field
+
+from phototaxis.arena import Arena
+
+SCHEMA = 1
+"""Version of the message schema; both sides of a bus must have the same."""
+
+Motor = Annotated[float, Meta(ge=-1, le=1)]
+Name = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$")]
+Count = Annotated[int, Meta(ge=0)]
+
+End = Literal["", "reached", "cap", "asked"]
+"""How an episode ends: it goes on, the light was reached (terminated), the step cap (truncated), by request."""
+
+
+class Message(Struct, forbid_unknown_fields=True, kw_only=True):
+    """What all messages share."""
+
+    schema: int = SCHEMA
+
+
+class World(Message):
+    """What does not change during a run: who, where, how long."""
+
+    run: Name
+    arena: Arena
+    seed: int
+    epochs: Count
+    """Learning steps after which the run is finished; 0: it goes on until it is stopped."""
+
+
+class State(Message):
+    """The world at one tick: the question that sensors and agent answer."""
+
+    run: Name
+    tick: Count
+    episode: Count
+    epoch: Count
+    """Motor commands applied so far in this run."""
+    time: float
+    x: float
+    y: float
+    heading: float
+    speed: float
+    """Forward velocity at the end of the control period, m/s."""
+    turn: float
+    """Rate of turn at the end of the control period, rad/s."""
+    front: bool
+    """The front half of the body touched something during the last control period."""
+    rear: bool
+    left: Motor
+    """The command just applied, and who gave it ("" for none: an episode begins, or the motors were stopped)."""
+    right: Motor
+    author: Name
+    driver: Name
+    """Who holds the seat ("" for nobody)."""
+    hash: str
+    """Chained over all states of the run: equal hashes, equal trajectories."""
+
+
+class Readings(Message):
+    """What the robot senses at one tick."""
+
+    run: Name
+    tick: Count
+    episode: Count
+    epoch: Count
+    sonar: Annotated[list[float], Meta(min_length=16, max_length=16)]
+    """Ranges in metres, at most the sonar range."""
+    light: tuple[Annotated[float, Meta(ge=0, le=1)], Annotated[float, Meta(ge=0, le=1)]]
+    """Front left, front right."""
+    front: bool
+    """Bumpers: contact during the last control period."""
+    rear: bool
+    left: Motor
+    """Echo of the state: the command just applied, its author, and who holds the seat."""
+    right: Motor
+    author: Name
+    driver: Name
+
+
+class Command(Message):
+    """The seated agent's answer to one tick."""
+
+    run: Name
+    tick: Count
+    author: Name
+    left: Motor
+    right: Motor
+    end: End = ""
+    """Not "": end the episode instead of moving; the next tick begins a new one at a fresh placement."""
+
+
+class Episode(Message):
+    """One episode, when it has ended."""
+
+    run: Name
+    episode: Count
+    tick: Count
+    """The last tick of the episode."""
+    steps: Count
+    end: End
+    driver: Name
+    x: float
+    """Where it started."""
+    y: float
+    heading: float
+
+
+Phase = Literal["waiting", "running", "paused", "finished"]
+
+
+class Status(Message):
+    """How the run is doing, several times a second."""
+
+    run: Name
+    phase: Phase
+    waiting_for: str = ""
+    """Whom a waiting simulation waits for."""
+    waited: float = 0.0
+    """Seconds without an answer."""
+    speed: float = 0.0
+    """0: lockstep, as fast as the answers come; else simulated seconds per second."""
+    tick: Count = 0
+    epoch: Count = 0
+    epochs: Count = 0
+    episode: Count = 0
+    episodes: Count = 0
+    """Episodes that have ended."""
+    reached: Count = 0
+    """Episodes that ended at the light."""
+    recent: float = 0.0
+    """Share of the last 50 ended episodes that reached the light."""
+    rate: float = 0.0
+    """Ticks a second over the last status interval."""
+    driver: Name = ""
+    alive: list[str] = field(default_factory=list)
+    """"role/id" of every component whose token is on the bus."""
+    refused: dict[str, int] = field(default_factory=dict)
+    """Messages refused or ignored by the simulation, by reason."""
+    hash: str = ""
+
+
+class Control(Message):
+    """A request to the simulation."""
+
+    verb: Literal["status", "pause", "resume", "step", "speed", "reset", "claim", "release", "stop"]
+    agent: Name = ""
+    """claim, release: whose seat."""
+    speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
+    """speed: 0 is lockstep."""
+
+
+class ControlReply(Message):
+    """What the simulation says to a request."""
+
+    ok: bool
+    reason: str
+    status: Status
+
+
+Column = list[float]
+
+
+class SimLog(Message):
+    """Poses, commands and ended episodes of consecutive ticks, in columns."""
+
+    run: Name
+    seq: Count
+    writer: Name
+    driver: Name
+    tick: list[int]
+    episode: list[int]
+    time: Column
+    x: Column
+    y: Column
+    heading: Column
+    left: Column
+    right: Column
+    contact: list[int]
+    """0 none, 1 front, 2 rear, 3 both."""
+    ended: list[Episode]
+
+
+class SensorsLog(Message):
+    """Readings of consecutive ticks, in columns; sonar and light are flattened row by row (16 and 2 a tick)."""
+
+    run: Name
+    seq: Count
+    writer: Name
+    tick: list[int]
+    sonar: Column
+    light: Column
+
+
+class AgentLog(Message):
+    """What the agent perceived, chose and learned at consecutive ticks, in columns."""
+
+    run: Name
+    seq: Count
+    writer: Name
+    learner: str
+    percept: str
+    """Name of the percept."""
+    tick: list[int]
+    state: list[int]
+    """Number of the percept's state."""
+    action: list[int]
+    """Index of the action; −1 where the agent ended the episode."""
+    reward: Column
+    td_error: Column
+    temperature: Column
+    values: Column = field(default_factory=list)
+    """At a modest rate: Q(state, action), flattened row by row, 9 actions a row; else empty."""
+    visits: list[int] = field(default_factory=list)
+    """With `values`: how often each state was met."""
+
+
+class LogRequest(Message):
+    """Asks a component for the log chunks it still has, from `seq` on."""
+
+    seq: Count = 0
+
+
+class Refused(Exception):
+    """A payload that is not a valid message; the text says why in a few words."""
+
+
+M = TypeVar("M", bound=Message)
+
+
+class _Header(Struct):
+    schema: int = 0
+
+
+encode = msgspec.msgpack.Encoder().encode
+
+
+class Decoder(Generic[M]):
+    """Decodes one message type from MessagePack or JSON, refusing what is oversized, malformed or foreign."""
+
+    def __init__(self, kind: type[M], limit: int):
+        self._limit = limit
+        self._msgpack = msgspec.msgpack.Decoder(kind)
+        self._json = msgspec.json.Decoder(kind)
+
+    def __call__(self, payload: bytes) -> M:
+        if len(payload) > self._limit:
+            raise Refused(f"oversized: {len(payload)} bytes, at most {self._limit}")
+        decoder: Any = self._json if payload[:1] == b"{" else self._msgpack
+        try:
+            message = decoder.decode(payload)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise Refused(_why(payload, error)) from None
+        if message.schema != SCHEMA:
+            raise Refused(f"schema {message.schema}, this side speaks {SCHEMA}")
+        return message
+
+
+def _why(payload: bytes, error: Exception) -> str:
+    """The clearest reason for a failed decode: the schema version first, then the field."""
+    header = msgspec.json.decode if payload[:1] == b"{" else msgspec.msgpack.decode
+    try:
+        schema = header(payload, type=_Header).schema
+    except Exception:
+        return f"malformed: {error}"
+    return f"schema {schema}, this side speaks {SCHEMA}" if schema != SCHEMA else f"invalid: {error}"

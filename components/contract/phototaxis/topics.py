@@ -1,0 +1,66 @@
+"""The one table of topics and the one table of roles; keys, subscriptions, limits and QoS derive from them."""
+
+from typing import Literal, NamedTuple
+
+from phototaxis import messages as m
+
+Kind = Literal["stream", "retained", "log", "query"]
+"""stream: the lockstep path, delivered or repeated. retained: answered by a queryable at any time.
+log: columns to be recorded, dropped under pressure, kept a while and answered by a queryable.
+query: a question to the writer."""
+
+
+class Topic(NamedTuple):
+    """One key of the bus."""
+
+    name: str
+    message: type[m.Message]
+    writer: str
+    kind: Kind
+    limit: int
+    """Largest payload that is decoded, bytes."""
+    about: str
+
+    def key(self, prefix: str) -> str:
+        """The Zenoh key under the prefix of one world."""
+        return f"{prefix}/{self.name}"
+
+
+TOPICS = {
+    topic.name: topic
+    for topic in (
+        Topic("world", m.World, "sim", "retained", 16_000_000, "the arena and what else does not change"),
+        Topic("state", m.State, "sim", "stream", 4_096, "pose, contacts, applied command, seat holder"),
+        Topic("readings", m.Readings, "sensors", "stream", 4_096, "sonars, lights, bumpers, echoed command"),
+        Topic("command", m.Command, "agent", "stream", 4_096, "the answer: two motors, or the episode's end"),
+        Topic("episode", m.Episode, "sim", "stream", 4_096, "one episode, when it has ended"),
+        Topic("status", m.Status, "sim", "stream", 16_384, "how the run is doing, 5 times a second"),
+        Topic("control", m.Control, "sim", "query", 4_096, "pause, resume, step, speed, reset, seat, stop"),
+        Topic("log/sim", m.SimLog, "sim", "log", 1_000_000, "poses, commands, ended episodes, in columns"),
+        Topic("log/sensors", m.SensorsLog, "sensors", "log", 1_000_000, "readings, in columns"),
+        Topic("log/agent", m.AgentLog, "agent", "log", 4_000_000, "percepts, actions, learning, in columns"),
+    )
+}
+
+
+class Role(NamedTuple):
+    """What one kind of component listens to, and whom it dials where no router is used."""
+
+    reads: tuple[str, ...]
+    dials: tuple[str, ...]
+    listens: bool = True
+
+
+ROLES = {
+    "sim": Role(reads=("command",), dials=()),
+    "sensors": Role(reads=("state",), dials=("sim",)),
+    "recorder": Role(reads=("log/sim", "log/sensors", "log/agent"), dials=("sim", "sensors")),
+    "agent": Role(reads=("readings",), dials=("sim", "sensors", "recorder"), listens=False),
+    "observer": Role(reads=("status",), dials=("sim",), listens=False),
+}
+"""sim listens, sensors and recorder dial it and listen, agents and observers only dial: they come and go freely."""
+
+
+def alive_key(prefix: str, role: str, ident: str) -> str:
+    """The key of a component's liveliness token."""
+    return f"{prefix}/alive/{role}/{ident}"

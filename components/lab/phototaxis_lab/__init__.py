@@ -1,0 +1,1 @@
+"""The same classes in one process, without a bus: training, evaluation, experiments."""

@@ -1,0 +1,17 @@
+"""`phototaxis sensors`: the sensor suite as a process."""
+
+from collections.abc import Sequence
+
+from phototaxis.component import ComponentOptions, entry, run
+from phototaxis.options import parse
+
+from phototaxis_sensors.server import Server
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    options = parse(ComponentOptions, argv, "phototaxis sensors", "Run the robot's sonars, lights and bumpers.")
+    run("sensors", options, lambda bus: Server(bus).serve())
+
+
+if __name__ == "__main__":
+    entry(main)

@@ -1,0 +1,24 @@
+"""What a ray can hit: the arena's static shapes in pymunk's spatial index."""
+
+import pymunk
+from phototaxis.arena import Arena
+from phototaxis.shapes import static_shapes
+
+_ALL = pymunk.ShapeFilter()
+
+
+class Scene:
+    """Casts rays among walls and obstacles; the cost hardly grows with their number."""
+
+    def __init__(self, arena: Arena):
+        self._space = pymunk.Space()
+        self._space.add(*static_shapes(arena, self._space.static_body))
+
+    def hit(self, start: tuple[float, float], end: tuple[float, float]) -> float:
+        """Where between `start` (0) and `end` (1) the ray first hits; 1 when it hits nothing."""
+        found = self._space.segment_query_first(start, end, 0, _ALL)
+        return 1.0 if found is None else found.alpha
+
+    def blocked(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
+        """Whether anything stands between two points."""
+        return self._space.segment_query_first(start, end, 0, _ALL) is not None

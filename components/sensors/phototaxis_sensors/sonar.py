@@ -1,0 +1,35 @@
+"""The built-in sonar model: 16 single rays from the robot's rim."""
+
+import math
+
+import numpy as np
+from phototaxis.arena import Arena
+
+from phototaxis_sensors.scene import Scene
+
+_BACK_OFF = 0.1
+"""A ray starts this far inside the body, m, so that a rim pressed into a wall reads 0 and not what is behind it."""
+
+
+class SonarModel:
+    """Ranges in metres, at most the sonar range, without noise."""
+
+    def __init__(self, arena: Arena, scene: Scene):
+        robot = arena.robot
+        self._scene, self._range = scene, robot.sonar_range
+        self._reach = robot.sonar_range + _BACK_OFF
+        mounts = np.array([sonar.position for sonar in robot.sonars])
+        angles = np.array([sonar.angle for sonar in robot.sonars])
+        aim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        starts = mounts - _BACK_OFF * aim
+        self._points = np.concatenate([starts, starts + self._reach * aim])  # (32, 2): starts, then ends
+
+    def __call__(self, x: float, y: float, heading: float) -> list[float]:
+        """The 16 ranges at a pose."""
+        cos, sin = math.cos(heading), math.sin(heading)
+        turned = self._points @ np.array([[cos, sin], [-sin, cos]])
+        turned += (x, y)
+        points = turned.tolist()
+        hit, reach = self._scene.hit, self._reach
+        found = [reach * hit(start, end) - _BACK_OFF for start, end in zip(points[:16], points[16:], strict=True)]
+        return [distance if distance > 0 else 0.0 for distance in found]

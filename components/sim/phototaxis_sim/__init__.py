@@ -1,0 +1,1 @@
+"""The world: arena, physics, time and the seat."""

@@ -1,0 +1,57 @@
+"""`phototaxis sim`: the simulation as a process."""
+
+import datetime
+import secrets
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta
+from phototaxis.bus import Bus
+from phototaxis.component import ComponentOptions, entry, run
+from phototaxis.journal import Journal
+from phototaxis.options import parse
+
+from phototaxis_sim import arenas
+from phototaxis_sim.pace import Pace
+from phototaxis_sim.server import Server
+from phototaxis_sim.simulation import Simulation
+
+
+class Options(ComponentOptions, kw_only=True):
+    """Options of the simulation."""
+
+    arena: str = "paper"
+    """name of a shipped arena, or a TOML file"""
+    seed: int = 0
+    """decides placements and sensor noise"""
+    epochs: Annotated[int, Meta(ge=0)] = 0
+    """learning steps after which the run is finished; 0: run until stopped"""
+    speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
+    """simulated seconds per second; 0: lockstep, as fast as the answers come"""
+    run: str = ""
+    """name of the run (default: date, time and a few random letters)"""
+    journal: str = ""
+    """file that lets a killed simulation continue its run"""
+
+
+def run_name() -> str:
+    """A fresh name for a run."""
+    return f"{datetime.datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    options = parse(Options, argv, "phototaxis sim", "Run the world: physics, time and the seat.")
+    arena = arenas.load(options.arena)
+    simulation = Simulation(arena, options.seed, options.run or run_name(), options.epochs)
+    journal = Journal(Path(options.journal)) if options.journal else None
+
+    def serve(bus: Bus) -> None:
+        pace = Pace(arena.motion.control_period, options.speed)
+        Server(bus, simulation, pace, journal).serve()
+
+    run("sim", options, serve)
+
+
+if __name__ == "__main__":
+    entry(main)

@@ -1,0 +1,46 @@
+"""When the next tick may come: in lockstep with the answers, or by the clock."""
+
+STOP_AFTER = 2.0
+"""In real time the motors stop when the newest command is older than this many control periods."""
+
+
+class Pace:
+    """Speed as a rate limit on the one protocol.
+
+    speed 0 is lockstep: a tick ends when its command comes. A speed s > 0 ends a tick every
+    control_period / s seconds, with the newest command; times are seconds of a monotonic clock.
+    """
+
+    def __init__(self, period: float, speed: float = 0.0):
+        self._period = period
+        self.speed = speed
+        self._tick_ends = 0.0
+        self._commanded = -float("inf")
+
+    @property
+    def realtime(self) -> bool:
+        return self.speed > 0
+
+    def set(self, speed: float, now: float) -> None:
+        """Change the speed from now on."""
+        self.speed = speed
+        self._tick_ends = now + self._length()
+
+    def begun(self, now: float) -> None:
+        """A tick has begun; a late one does not make the next ones hurry."""
+        self._tick_ends = max(self._tick_ends + self._length(), now)
+
+    def commanded(self, now: float) -> None:
+        """A command for the present tick has come."""
+        self._commanded = now
+
+    def wait(self, now: float) -> float:
+        """Seconds until the present tick ends by the clock."""
+        return max(self._tick_ends - now, 0.0)
+
+    def stale(self, now: float) -> bool:
+        """Whether the newest command is too old to drive on."""
+        return now - self._commanded > STOP_AFTER * self._length()
+
+    def _length(self) -> float:
+        return self._period / self.speed if self.speed else 0.0

@@ -1,0 +1,179 @@
+"""A differential-drive robot among walls: pymunk does the collisions.
+
+The robot is overdamped: in each physics step the solver starts from the velocity that the wheels ask
+for and takes away what the contacts forbid, so that the body is stopped by a wall and slides along it.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import pymunk
+from phototaxis.arena import Arena
+from phototaxis.errors import UserError
+from phototaxis.shapes import static_shapes
+
+_ROBOT = 1
+_FAR = -1000.0
+_TRIES = 10_000
+_MASS = 10.0
+_GRIP = 100.0
+"""How much harder the wheels make it for a contact to turn the body (times the body's own inertia)."""
+
+
+class Pose(NamedTuple):
+    """Position in metres, heading in radians."""
+
+    x: float
+    y: float
+    heading: float
+
+
+class Motion(NamedTuple):
+    """Where a control period has led."""
+
+    pose: Pose
+    speed: float
+    turn: float
+    front: bool
+    rear: bool
+
+
+class Physics:
+    """The arena and the robot's body in one pymunk space.
+
+    What follows a `place` depends on the pose and the commands alone, never on earlier episodes.
+
+    Raises
+    ------
+    UserError
+        when a wall, a polygon or the robot has no extent.
+    """
+
+    def __init__(self, arena: Arena):
+        self._arena, self._robot = arena, arena.robot
+        self._dt = arena.motion.physics_step
+        self._steps = arena.physics_steps
+        self._stall = arena.motion.collision == "stall"
+        self._front = self._rear = False
+        space = self._space = pymunk.Space()
+        space.damping = 0.0  # velocity is what the force of this step makes it: no inertia
+        space.collision_slop = 0.001
+        space.collision_bias = 1e-6
+        space.iterations = 20
+        for shape in static_shapes(arena, space.static_body):
+            shape.friction = arena.motion.friction
+            space.add(shape)
+        size = (self._robot.length, self._robot.width)
+        self._body = pymunk.Body(_MASS, _GRIP * pymunk.moment_for_box(_MASS, size))
+        self._box = pymunk.Poly.create_box(self._body, size)
+        self._box.collision_type = _ROBOT
+        self._box.friction = arena.motion.friction
+        self._moment = self._body.moment
+        clear = arena.placement.clearance
+        self._probe = pymunk.Poly.create_box(None, (size[0] + 2 * clear, size[1] + 2 * clear))
+        space.add(self._body, self._box)
+        space.on_collision(_ROBOT, None, post_solve=self._touched)
+
+    def place(self, pose: Pose) -> Motion:
+        """Put the robot at rest at a pose."""
+        body, space = self._body, self._space
+        for x, y, heading in ((_FAR, _FAR, 0.0), pose):  # far away all contacts expire
+            body.position, body.angle = (x, y), heading
+            body.velocity, body.angular_velocity = (0, 0), 0
+            space.reindex_shapes_for_body(body)
+            for _ in range(space.collision_persistence + 1):
+                space.step(self._dt)
+        self._front = self._rear = False
+        return Motion(pose, 0.0, 0.0, False, False)
+
+    def free(self, pose: Pose) -> bool:
+        """Whether the robot, with the placement's clearance around it, touches nothing at a pose."""
+        width, height = self._arena.size
+        if not (0 < pose.x < width and 0 < pose.y < height):
+            return False
+        return not self._hits(self._probe, pose)
+
+    def random_pose(self, rng: np.random.Generator) -> Pose:
+        """A free pose, uniform over the room, far enough from every light.
+
+        Raises
+        ------
+        UserError
+            when 10,000 tries found none.
+        """
+        width, height = self._arena.size
+        away = self._arena.placement.light_distance
+        for _ in range(_TRIES):
+            u, v, w = rng.random(3).tolist()
+            pose = Pose(u * width, v * height, (2 * w - 1) * math.pi)
+            distances = (math.dist(pose[:2], light.position) for light in self._arena.lights)
+            if min(distances) >= away and self.free(pose):
+                return pose
+        raise UserError(
+            f"arena {self._arena.name}: the robot ({self._robot.length} × {self._robot.width} m) fits nowhere: no free "
+            f"place {away} m from the lights in {_TRIES} tries; make room, or lower placement.light_distance"
+        )
+
+    def drive(self, left: float, right: float) -> Motion:
+        """Hold a wheel command (−1..1 each) for one control period."""
+        self._front = self._rear = False
+        speed = self._robot.speed * (left + right) / 2
+        turn = self._robot.turn * (right - left) / 2
+        return self._refuse_contact(speed, turn) if self._stall else self._slide(speed, turn)
+
+    def _slide(self, speed: float, turn: float) -> Motion:
+        """One solve at rest, so that old contacts meet the new command, then solve and move in turn."""
+        body, step, dt = self._body, self._space.step, self._dt
+        push, torque = _MASS * speed / dt, self._moment * turn / dt
+        body.velocity, body.angular_velocity = (0, 0), 0
+        for _ in range(self._steps + 1):
+            angle = body.angle
+            body.force = push * math.cos(angle), push * math.sin(angle)
+            body.torque = torque
+            step(dt)
+        angle = body.angle
+        vx, vy = body.velocity
+        x, y = body.position
+        forward = vx * math.cos(angle) + vy * math.sin(angle)
+        heading = math.remainder(angle, math.tau)
+        return Motion(Pose(x, y, heading), forward, body.angular_velocity, self._front, self._rear)
+
+    def _refuse_contact(self, speed: float, turn: float) -> Motion:
+        """A physics step that would touch anything is not made at all (the Pyro simulator's stall)."""
+        x, y = self._body.position
+        angle = self._body.angle
+        moved = True
+        for _ in range(self._steps):
+            heading = angle + turn * self._dt
+            middle = (angle + heading) / 2
+            ahead = speed * self._dt
+            pose = Pose(x + ahead * math.cos(middle), y + ahead * math.sin(middle), heading)
+            moved = not self._hits(self._box, pose)
+            if moved:
+                x, y, angle = pose
+            else:
+                self._front |= speed > 0 or (speed == 0 and turn != 0)
+                self._rear |= speed < 0
+        self._body.position, self._body.angle = (x, y), angle
+        heading = math.remainder(angle, math.tau)
+        at_end = (speed, turn) if moved else (0.0, 0.0)
+        return Motion(Pose(x, y, heading), *at_end, self._front, self._rear)
+
+    def _hits(self, shape: pymunk.Poly, pose: Pose) -> bool:
+        """Whether a box of the robot's kind would touch a static shape at a pose."""
+        transform = pymunk.Transform(
+            math.cos(pose.heading), math.sin(pose.heading), -math.sin(pose.heading), math.cos(pose.heading), *pose[:2]
+        )
+        test = pymunk.Poly(pymunk.Body(body_type=pymunk.Body.KINEMATIC), shape.get_vertices(), transform)
+        return any(hit.shape is not self._box for hit in self._space.shape_query(test))
+
+    def _touched(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        if not arbiter.total_impulse:  # beside a wall, or leaving it: nothing presses
+            return
+        for point in arbiter.contact_point_set.points:
+            if self._body.world_to_local(point.point_a).x >= 0:
+                self._front = True
+            else:
+                self._rear = True
+

@@ -1,0 +1,261 @@
+"""The simulation on the bus: asks each tick, waits for its answer, keeps the seat and the status."""
+
+import time
+from collections import deque
+from typing import Any
+
+import msgspec
+from phototaxis.bus import Bus, Event
+from phototaxis.chunks import Chunks
+from phototaxis.journal import Journal
+from phototaxis.messages import Command, Control, ControlReply, Phase, SimLog, Status
+from phototaxis.protocol import Question
+
+from phototaxis_sim.pace import Pace
+from phototaxis_sim.seat import Seat
+from phototaxis_sim.simulation import Simulation, Snapshot
+
+STATUS_EVERY = 0.2
+WAITS_AFTER = 0.5
+"""Seconds without an answer after which the status says "waiting" and for whom."""
+
+
+class Entry(msgspec.Struct, array_like=True):
+    """What the journal keeps of one tick."""
+
+    left: float
+    right: float
+    author: str
+    end: str
+
+
+class Server:
+    """Drives a `Simulation` by the answers that come from the bus.
+
+    With a journal that holds the same run, it continues where that run was killed: the episode's start
+    is restored and its commands are made again.
+    """
+
+    def __init__(self, bus: Bus, simulation: Simulation, pace: Pace, journal: Journal | None = None):
+        self._bus, self._sim, self._pace, self._journal = bus, simulation, pace, journal
+        self._seat, self._question = Seat(), Question()
+        self._alive: set[str] = set()
+        self._sensed = 0
+        self._held: Command | None = None
+        self._paused = self._stopping = self._finished = False
+        self._steps_due = 0
+        self._recent: deque[bool] = deque(maxlen=50)
+        self._status_at = self._rate_at = 0.0
+        self._rate_tick, self._rate = 0, 0.0
+        self._ended: list[Any] = []
+        self._log = Chunks(bus, "log/sim", self._chunk)
+        if journal is not None:
+            self._continue(journal)
+
+    def serve(self) -> None:
+        """Run until a "stop" event or request."""
+        self._ask()
+        while not self._stopping:
+            event = self._bus.receive(timeout=self._timeout())
+            if event is not None:
+                self._handle(event)
+            now = time.monotonic()
+            if self._pace.realtime and not self._paused and self._pace.wait(now) == 0:
+                self._tick_by_clock(now)
+            elif self._question.due(now) and not self._finished:
+                self._publish()
+            self._log.poll(now)
+            if now >= self._status_at:
+                self._announce(now)
+        self._log.flush()
+        self._announce(time.monotonic())
+
+    def _timeout(self) -> float:
+        now = time.monotonic()
+        until = min(self._status_at, self._question.repeat_at) - now
+        if self._pace.realtime and not self._paused:
+            until = min(until, self._pace.wait(now))
+        return min(max(until, 0.0), 0.05)
+
+    def _handle(self, event: Event) -> None:
+        if event.topic == "command":
+            self._command(event.message)
+        elif event.topic == "control":
+            self._control(event)
+        elif event.topic == "world" and event.reply:
+            event.reply(self._sim.world)
+        elif event.topic == "log/sim":
+            self._log.answer(event)
+        elif event.topic == "alive":
+            self._alive.add("/".join(event.message))
+        elif event.topic == "gone":
+            self._alive.discard("/".join(event.message))
+            self._seat.leave(event.message[1])
+        elif event.topic == "stop":
+            self._stopping = True
+
+    def _command(self, command: Command) -> None:
+        state = self._sim.state
+        if command.run != state.run:
+            return self._bus.refuse("command", f"another run: {command.run}")
+        if command.tick != state.tick:
+            return self._bus.refuse("command", f"another tick: {command.tick} at {state.tick}")
+        if command.author != self._seat.driver or not command.author:
+            return self._bus.refuse("command", f"not the driver: {command.author}")
+        self._held = command
+        self._pace.commanded(time.monotonic())
+        if not self._pace.realtime:
+            self._answered()
+        return None
+
+    def _answered(self) -> None:
+        """The command of this tick is here: apply it, unless the run is over or paused."""
+        command = self._held
+        if command is None or self._finished:
+            return
+        if self._sim.finished:
+            self._finished = True
+            self._log_state()
+            self._log.flush()
+            self._announce(time.monotonic())
+        elif not self._paused or self._steps_due:
+            self._steps_due = max(self._steps_due - 1, 0)
+            self._apply(Entry(command.left, command.right, command.author, command.end))
+
+    def _tick_by_clock(self, now: float) -> None:
+        """In real time: the newest command holds until it is stale, then the motors stop."""
+        command = self._held
+        state = self._sim.state
+        if command is not None and command.tick == state.tick:
+            self._answered()
+        elif self._seat.driver and not self._finished and not self._sim.finished:
+            held = command is not None and not command.end and not self._pace.stale(now)
+            motors = (state.left, state.right, state.author) if held else (0.0, 0.0, "")
+            self._apply(Entry(*motors, ""))
+        self._pace.begun(now)
+
+    def _apply(self, entry: Entry) -> None:
+        if self._journal is not None and not entry.end:
+            self._journal.append(msgspec.msgpack.encode(entry))
+        self._log_state()
+        self._advance(entry)
+        if self._journal is not None and entry.end:
+            self._journal.begin(self._header())
+        self._ask()
+        if self._sim.ended is not None:
+            self._ended.append(self._sim.ended)
+            self._bus.put("episode", self._sim.ended)
+
+    def _advance(self, entry: Entry) -> None:
+        self._held = None
+        self._sim.advance(entry.left, entry.right, entry.author, entry.end)  # type: ignore[arg-type]
+        if self._sim.ended is not None:
+            self._recent.append(self._sim.ended.end == "reached")
+
+    def _ask(self) -> None:
+        self._question.asked(time.monotonic())
+        self._publish()
+
+    def _publish(self) -> None:
+        self._sim.state.driver = self._seat.driver
+        self._bus.put("state", self._sim.state)
+
+    def _control(self, event: Event) -> None:
+        request: Control | None = event.message
+        reason = "an empty request" if request is None else self._obey(request)
+        if event.reply:
+            event.reply(ControlReply(not reason, reason, self._status(time.monotonic())))
+
+    def _obey(self, request: Control) -> str:
+        """Do what is asked; a reason when it is refused, else ""."""
+        verb, now = request.verb, time.monotonic()
+        if verb == "claim":
+            reason = self._seat.claim(request.agent)
+            if not reason:
+                self._ask()
+            return reason
+        if verb == "release":
+            return "" if self._seat.leave(request.agent) else f"{request.agent} does not hold the seat"
+        if verb == "pause":
+            self._paused = True
+        elif verb == "resume":
+            self._paused, self._steps_due = False, 0
+            self._pace.set(self._pace.speed, now)
+            self._answered()
+        elif verb == "step":
+            if not self._paused:
+                return "single steps need a paused simulation; pause it first"
+            self._steps_due += 1
+            self._answered()
+        elif verb == "speed":
+            self._pace.set(request.speed, now)
+        elif verb == "reset":
+            if self._finished or self._sim.finished:
+                return "the run is finished"
+            self._apply(Entry(0.0, 0.0, self._seat.driver, "asked"))
+        elif verb == "stop":
+            self._bus.stop()
+        return ""
+
+    def _phase(self, now: float) -> tuple[Phase, str, float]:
+        """The phase, whom it waits for, and how long."""
+        if self._finished:
+            return "finished", "", 0.0
+        if self._paused:
+            return "paused", "", 0.0
+        waited = now - self._question.asked_at
+        missing = [role for role in ("sensors", "agent") if not any(a.startswith(role + "/") for a in self._alive)]
+        if missing:
+            return "waiting", " and ".join(missing), waited
+        if not self._seat.driver:
+            return "waiting", "an agent to take the seat", waited
+        if waited > max(WAITS_AFTER, 2 * self._pace.wait(now)) and self._held is None:
+            return "waiting", f"the command of {self._seat.driver}", waited
+        return "running", "", 0.0
+
+    def _status(self, now: float) -> Status:
+        sim, (phase, whom, waited) = self._sim, self._phase(now)
+        state = sim.state
+        return Status(
+            run=sim.world.run, phase=phase, waiting_for=whom, waited=waited, speed=self._pace.speed,
+            tick=state.tick, epoch=state.epoch, epochs=sim.world.epochs, episode=state.episode,
+            episodes=sim.episodes, reached=sim.reached,
+            recent=sum(self._recent) / len(self._recent) if self._recent else 0.0,
+            rate=self._rate, driver=self._seat.driver, alive=sorted(self._alive),
+            refused=dict(self._bus.refused), hash=state.hash,
+        )  # fmt: skip
+
+    def _announce(self, now: float) -> None:
+        if now - self._rate_at >= 1.0:
+            self._rate = (self._sim.state.tick - self._rate_tick) / (now - self._rate_at) if self._rate_at else 0.0
+            self._rate_at, self._rate_tick = now, self._sim.state.tick
+        self._status_at = now + STATUS_EVERY
+        self._bus.put("status", self._status(now))
+
+    def _log_state(self) -> None:
+        s = self._sim.state
+        contact = s.front + 2 * s.rear
+        row = (s.tick, s.episode, s.time, s.x, s.y, s.heading, s.left, s.right, contact)
+        self._log.add(row, time.monotonic())
+
+    def _chunk(self, seq: int, columns: list[Any]) -> SimLog:
+        ended, self._ended = self._ended, []
+        return SimLog(self._sim.world.run, seq, self._bus.ident, self._seat.driver, *columns, ended)
+
+    def _header(self) -> bytes:
+        return msgspec.msgpack.encode(self._sim.snapshot(list(self._recent)))
+
+    def _continue(self, journal: Journal) -> None:
+        """Restore what the journal holds of this run, or begin a new journal."""
+        frames = journal.read()
+        snapshot = msgspec.msgpack.decode(frames[0], type=Snapshot) if frames else None
+        if snapshot is None or snapshot.run != self._sim.world.run:
+            journal.begin(self._header())
+            return
+        self._sim.restore(snapshot)
+        self._recent.extend(snapshot.recent)
+        journal.begin(frames[0])
+        for frame in frames[1:]:
+            journal.append(frame)
+            self._log_state()
+            self._advance(msgspec.msgpack.decode(frame, type=Entry))

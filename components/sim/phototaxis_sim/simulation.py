@@ -1,0 +1,112 @@
+"""A run: ticks, episodes and epochs over the physics. Knows nothing of the bus or of wall-clock time."""
+
+import hashlib
+import struct
+
+import numpy as np
+from msgspec import Struct
+from phototaxis.arena import Arena
+from phototaxis.messages import End, Episode, State, World
+
+from phototaxis_sim.physics import Motion, Physics, Pose
+
+_HASHED = struct.Struct("<8sqqqddddddd")
+
+
+class Snapshot(Struct):
+    """A run at the first tick of an episode."""
+
+    run: str
+    tick: int
+    episode: int
+    epoch: int
+    episodes: int
+    reached: int
+    chain: bytes
+    """The hash before that tick."""
+    recent: list[bool]
+    """Whether the last ended episodes reached the light."""
+
+
+class Simulation:
+    """One robot in one arena, from tick to tick.
+
+    Parameters
+    ----------
+    arena : the world.
+    seed : decides where each episode starts, as a pure function of (seed, episode).
+    run : name of the run; has no influence on the trajectory.
+    epochs : motor commands after which the run is finished; 0 for no end.
+
+    Attributes
+    ----------
+    state : State
+        the present tick; `driver` is filled in by whoever keeps the seat.
+    ended : Episode or None
+        the episode that ended in the last `advance`.
+    """
+
+    def __init__(self, arena: Arena, seed: int, run: str, epochs: int = 0):
+        self.world = World(run, arena, seed, epochs)
+        self.ended: Episode | None = None
+        self.episodes = self.reached = 0
+        self._physics = Physics(arena)
+        self._period = arena.motion.control_period
+        self._tick = self._episode = self._epoch = self._steps = 0
+        self._chain = b"\0" * 8
+        self._start = Pose(0, 0, 0)
+        self.state = self._begin()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last epoch has been made; its state is still to be answered."""
+        return 0 < self.world.epochs <= self._epoch
+
+    def advance(self, left: float, right: float, author: str, end: End = "") -> State:
+        """Hold a command for one control period, or end the episode; the next state."""
+        self.ended = None
+        self._tick += 1
+        if end:
+            self.ended = Episode(
+                self.world.run, self._episode, self._tick - 1, self._steps, end, author, *self._start
+            )
+            self.episodes += 1
+            self.reached += end == "reached"
+            self._episode += 1
+            self._steps = 0
+            self.state = self._begin()
+        else:
+            self._epoch += 1
+            self._steps += 1
+            self.state = self._report(self._physics.drive(left, right), left, right, author)
+        return self.state
+
+    def snapshot(self, recent: list[bool]) -> Snapshot:
+        """What `restore` needs to begin the present episode again; only at its first tick."""
+        return Snapshot(
+            self.world.run, self._tick, self._episode, self._epoch, self.episodes, self.reached, self._before, recent
+        )
+
+    def restore(self, at: Snapshot) -> None:
+        """Go to the first tick of an episode; the same commands then lead to the same states."""
+        self._tick, self._episode, self._epoch, self._steps = at.tick, at.episode, at.epoch, 0
+        self.episodes, self.reached, self._chain = at.episodes, at.reached, at.chain
+        self.state = self._begin()
+
+    def _begin(self) -> State:
+        self._before = self._chain
+        rng = np.random.default_rng((self.world.seed, self._episode))
+        self._start = self._physics.random_pose(rng)
+        return self._report(self._physics.place(self._start), 0.0, 0.0, "")
+
+    def _report(self, motion: Motion, left: float, right: float, author: str) -> State:
+        (x, y, heading), speed, turn, front, rear = motion
+        tick, episode, epoch = self._tick, self._episode, self._epoch
+        contacts = front + 2 * rear
+        packed = _HASHED.pack(self._chain, tick, 4 * episode + contacts, epoch, x, y, heading, speed, turn, left, right)
+        digest = hashlib.blake2b(packed, digest_size=8)
+        self._chain = digest.digest()
+        return State(
+            self.world.run, tick, episode, epoch, tick * self._period, x, y, heading, speed, turn,
+            front, rear, left, right, author, "", digest.hexdigest(),
+        )  # fmt: skip
