@@ -22,8 +22,6 @@ class Options(ComponentOptions, kw_only=True):
     """checkpoint to begin with"""
     agent_seed: Annotated[int, Meta(ge=0)] | None = None
     """seed of the learner and its exploration (default: the run's)"""
-    restarted: bool = False
-    """this process replaces one that died: continue from its checkpoint and journal, if there are any"""
 
 
 def main(argv: Sequence[str] | None = None) -> None:

@@ -17,6 +17,8 @@ class ComponentOptions(BusOptions, kw_only=True):
 
     tethered: bool = False
     """end when standard input closes, so that no process outlives the one that started it"""
+    restarted: bool = False
+    """this process replaces one that died: continue from what that one left on disk, if anything"""
 
 
 def run(role: str, options: ComponentOptions, serve: Callable[[Bus], None], label: str = "") -> None:

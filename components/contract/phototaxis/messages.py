@@ -141,7 +141,9 @@ class Status(Message):
     recent: float = 0.0
     """Share of the last 50 ended episodes that reached the light."""
     rate: float = 0.0
-    """Ticks a second over the last status interval."""
+    """Ticks a second over the last second."""
+    mean_rate: float = 0.0
+    """Ticks a second since the first answer (of this simulation process)."""
     driver: Name = ""
     alive: list[str] = field(default_factory=list)
     """"role/id" of every component whose token is on the bus."""

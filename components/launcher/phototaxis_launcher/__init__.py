@@ -1,1 +1,1 @@
-"""x"""
+"""The `phototaxis` command: starts the processes of a run, watches over them, and finds its way to the rest."""

@@ -1,1 +1,1 @@
-"""x"""
+"""What happened, in Rerun: live and on disk."""

@@ -47,6 +47,8 @@ class Server:
         self._recent: deque[bool] = deque(maxlen=50)
         self._status_at = self._rate_at = 0.0
         self._rate_tick, self._rate = 0, 0.0
+        self._started: tuple[float, int] | None = None
+        self._mean_rate = 0.0
         self._ended: list[Any] = []
         self._log = Chunks(bus, "log/sim", self._chunk)
         if journal is not None:
@@ -103,7 +105,10 @@ class Server:
         if command.author != self._seat.driver or not command.author:
             return self._bus.refuse("command", f"not the driver: {command.author}")
         self._held = command
-        self._pace.commanded(time.monotonic())
+        now = time.monotonic()
+        if self._started is None:
+            self._started = now, state.tick
+        self._pace.commanded(now)
         if not self._pace.realtime:
             self._answered()
         return None
@@ -114,9 +119,10 @@ class Server:
         if command is None or self._finished:
             return
         if self._sim.finished:
-            self._finished = True
             self._log_state()
             self._log.flush()
+            self._announce(time.monotonic())  # the last mean rate
+            self._finished = True
             self._announce(time.monotonic())
         elif not self._paused or self._steps_due:
             self._steps_due = max(self._steps_due - 1, 0)
@@ -221,7 +227,7 @@ class Server:
             tick=state.tick, epoch=state.epoch, epochs=sim.world.epochs, episode=state.episode,
             episodes=sim.episodes, reached=sim.reached,
             recent=sum(self._recent) / len(self._recent) if self._recent else 0.0,
-            rate=self._rate, driver=self._seat.driver, alive=sorted(self._alive),
+            rate=self._rate, mean_rate=self._mean_rate, driver=self._seat.driver, alive=sorted(self._alive),
             refused=dict(self._bus.refused), hash=state.hash,
         )  # fmt: skip
 
@@ -230,6 +236,9 @@ class Server:
             self._rate = (self._sim.state.tick - self._rate_tick) / (now - self._rate_at) if self._rate_at else 0.0
             self._rate_at, self._rate_tick = now, self._sim.state.tick
         self._status_at = now + STATUS_EVERY
+        if self._started and not self._finished:
+            since, tick = self._started
+            self._mean_rate = (self._sim.state.tick - tick) / max(now - since, 1e-9)
         self._bus.put("status", self._status(now))
 
     def _log_state(self) -> None:

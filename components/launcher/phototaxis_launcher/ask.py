@@ -1,0 +1,94 @@
+"""`phototaxis status` and `phototaxis control`: talk to a running simulation from another terminal."""
+
+import sys
+import time
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+from phototaxis.bus import Bus
+from phototaxis.errors import Unavailable, UserError
+from phototaxis.messages import Control, ControlReply, Status
+from phototaxis.options import parse
+from phototaxis.session import BusOptions, open_session
+
+PATIENCE = 2.0
+
+
+class StatusOptions(BusOptions, kw_only=True):
+    """Options of `phototaxis status`."""
+
+    json: bool = False
+    """print the status as one JSON object"""
+
+
+class ControlOptions(BusOptions, kw_only=True):
+    """Options of `phototaxis control`."""
+
+    verb: Literal["pause", "resume", "step", "speed", "reset", "stop"] = "pause"
+    """what to do; step: one tick of a paused simulation; reset: end the episode"""
+    speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
+    """for the verb speed: simulated seconds per second; 0: lockstep"""
+
+
+def request(options: BusOptions, control: Control) -> ControlReply:
+    """Ask the simulation on the bus.
+
+    Raises
+    ------
+    Unavailable
+        when there is none, or it does not answer.
+    """
+    with open_session("observer", options) as session, Bus(session, options.name, "observer", "ask") as bus:
+        deadline = time.monotonic() + PATIENCE
+        while (left := deadline - time.monotonic()) > 0:
+            event = bus.receive(timeout=left)
+            if event is not None and event.topic == "alive" and event.message[0] == "sim":
+                reply = bus.control(control, timeout=PATIENCE)
+                if reply is not None:
+                    return reply
+                raise Unavailable(f"the simulation of '{options.name}' does not answer; is it stopped or overloaded?")
+    raise Unavailable(f"no simulation in the world '{options.name}'; start one with: phototaxis up")
+
+
+def status(argv: Sequence[str]) -> int:
+    about = "Say who is alive, which tick it is, who drives, how fast, and what is awaited."
+    options = parse(StatusOptions, argv, "phototaxis status", about)
+    found = request(options, Control("status")).status
+    if options.json:
+        print(msgspec.json.encode(found).decode())
+    else:
+        print("\n".join(describe(found)))
+    return 0
+
+
+def control(argv: Sequence[str]) -> int:
+    about = "Pause, resume, single-step, re-pace, reset or stop the running simulation."
+    options = parse(ControlOptions, argv, "phototaxis control", about, positional=["verb"])
+    reply = request(options, Control(options.verb, speed=options.speed))
+    if not reply.ok:
+        raise UserError(reply.reason)
+    print("\n".join(describe(reply.status)), file=sys.stderr)
+    return 0
+
+
+def describe(status: Status) -> list[str]:
+    """A status in words."""
+    phase = status.phase
+    if phase == "waiting":
+        phase += f" for {status.waiting_for}, {status.waited:.1f} s"
+    speed = f"{status.speed:g} × real time" if status.speed else "lockstep"
+    rows = {
+        "run": status.run,
+        "phase": phase,
+        "tick": f"{status.tick}  (epoch {status.epoch}{f' of {status.epochs}' if status.epochs else ''})",
+        "episode": f"{status.episode}  ({status.reached} of {status.episodes} reached the light, "
+        f"{status.recent:.0%} of the last 50)",
+        "speed": f"{speed}, {status.rate:.0f} ticks/s",
+        "driver": status.driver or "nobody",
+        "alive": ", ".join(who.split("/")[1] for who in status.alive if not who.startswith("observer/")),
+    }
+    if status.refused:
+        rows["refused"] = ", ".join(f"{reason} × {count}" for reason, count in status.refused.items())
+    return [f"{name:8} {text}" for name, text in rows.items()]

@@ -1,0 +1,68 @@
+"""The one command line: a table of subcommands, each loaded when it is called."""
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import NamedTuple
+
+from phototaxis import __version__
+from phototaxis.errors import UserError, one_line
+
+
+class Verb(NamedTuple):
+    """One subcommand."""
+
+    target: str
+    """module:function, called with the words after the verb."""
+    extra: str
+    """The extra that brings what it needs."""
+    about: str
+
+
+VERBS = {
+    "demo": Verb("phototaxis_launcher.demo:main", "all", "learn 3,000 epochs over the bus, watch, evaluate"),
+    "up": Verb("phototaxis_launcher.up:main", "launcher", "start a run: sim, sensors, agent, recorder"),
+    "status": Verb("phototaxis_launcher.ask:status", "launcher", "who is alive, which tick, who drives, what is awaited"),
+    "control": Verb("phototaxis_launcher.ask:control", "launcher", "pause, resume, step, speed, reset, stop"),
+    "sim": Verb("phototaxis_sim.__main__:main", "sim", "the simulation alone"),
+    "sensors": Verb("phototaxis_sensors.__main__:main", "sensors", "the sensors alone"),
+    "agent": Verb("phototaxis_agent.__main__:main", "agent", "an agent alone"),
+    "recorder": Verb("phototaxis_recorder.__main__:main", "recorder", "the recorder alone"),
+    "train": Verb("phototaxis_lab.train:main", "lab", "the same learning in one process, without a bus"),
+    "evaluate": Verb("phototaxis_lab.evaluate:main", "lab", "measure a frozen policy on fresh placements"),
+}
+
+
+def main() -> None:
+    """Entry point of the `phototaxis` command."""
+    sys.exit(one_line(lambda: dispatch(sys.argv[1:])))
+
+
+def dispatch(words: list[str]) -> int:
+    """Call the subcommand that the first word names."""
+    if not words or words[0] in ("-h", "--help"):
+        print(usage())
+        return 0
+    if words[0] == "--version":
+        print(__version__)
+        return 0
+    verb = VERBS.get(words[0])
+    if verb is None:
+        raise UserError(f"no command '{words[0]}'; there are: {', '.join(VERBS)}")
+    return _load(words[0], verb)(words[1:]) or 0
+
+
+def _load(name: str, verb: Verb) -> Callable[[list[str]], int | None]:
+    module, _, function = verb.target.partition(":")
+    try:
+        return getattr(import_module(module), function)
+    except ModuleNotFoundError as error:
+        raise UserError(
+            f"'phototaxis {name}' needs the package {error.name}; install it with: pip install 'phototaxis[{verb.extra}]'"
+        ) from None
+
+
+def usage() -> str:
+    """The list of subcommands."""
+    rows = [f"  {name:10} {verb.about}" for name, verb in VERBS.items()]
+    return "\n".join(["usage: phototaxis COMMAND [OPTIONS]   (each has --help)", "", *rows])

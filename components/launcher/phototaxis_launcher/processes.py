@@ -1,0 +1,93 @@
+"""Child processes: started, watched, restarted when they die, and always ended."""
+
+import subprocess
+import sys
+import time
+from collections import deque
+from pathlib import Path
+
+from phototaxis.errors import ComponentFailed, Unavailable, UserError
+
+RESTARTS = 3
+WITHIN = 20.0
+"""A component that dies more than RESTARTS times within this many seconds keeps dying."""
+MENDABLE = {2: UserError, 3: Unavailable}
+"""Exit codes by which a component says that the user can mend it; it is not restarted."""
+
+
+class Child:
+    """One component process; its stderr goes to a file.
+
+    It is tethered: when this process ends, however it ends, the child's standard input closes and the
+    child leaves.
+    """
+
+    def __init__(self, role: str, module: str, arguments: list[str], folder: Path):
+        self.role = role
+        self._module, self._arguments = module, arguments
+        self._log = folder / f"{role}.log"
+        self._deaths: deque[float] = deque(maxlen=RESTARTS + 1)
+        self.restarts = 0
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def start(self, *extra: str) -> None:
+        """Start the process in a session of its own, so that Ctrl-C reaches the launcher alone."""
+        with self._log.open("ab") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", self._module, "--tethered", *self._arguments, *extra],
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+
+    def watch(self) -> bool:
+        """Restart the process if it has died; whether it had to.
+
+        Raises
+        ------
+        UserError, Unavailable
+            when it ended with a line that the user can act on.
+        ComponentFailed
+            when it keeps dying; the text ends with its stderr.
+        """
+        if self.process is None or self.process.poll() is None:
+            return False
+        code = self.process.returncode
+        if code in MENDABLE:
+            line = self.tail(1).removeprefix("phototaxis: error: ")
+            raise MENDABLE[code](f"{self.role}: {line}")
+        self._deaths.append(time.monotonic())
+        if len(self._deaths) > RESTARTS and self._deaths[-1] - self._deaths[0] < WITHIN:
+            raise ComponentFailed(
+                f"{self.role} died {len(self._deaths)} times, last with {_meaning(code)}; its last words:\n{self.tail(20)}"
+            )
+        self.restarts += 1
+        self.start("--restarted")
+        return True
+
+    def stop(self, patience: float) -> None:
+        """Ask the process to end, and end it when it does not within `patience` seconds."""
+        if self.process is None:
+            return
+        if self.process.poll() is None:
+            self.process.terminate()
+            try:
+                self.process.wait(patience)
+            except subprocess.TimeoutExpired:
+                print(f"phototaxis: {self.role} did not end within {patience:g} s and was killed", file=sys.stderr)
+                self.process.kill()
+                self.process.wait()
+        if self.process.stdin is not None:
+            self.process.stdin.close()
+
+    def tail(self, lines: int) -> str:
+        """The last lines it wrote."""
+        try:
+            return "\n".join(self._log.read_text(errors="replace").splitlines()[-lines:])
+        except FileNotFoundError:
+            return ""
+
+
+def _meaning(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"

@@ -1,0 +1,41 @@
+"""How a run is doing: a bar on a terminal, plain lines elsewhere; all on stderr."""
+
+import sys
+import time
+
+from phototaxis.messages import Status
+from tqdm import tqdm
+
+LINE_EVERY = 2.0
+
+
+class Progress:
+    """Shows statuses as they come."""
+
+    def __init__(self, epochs: int):
+        self._said = 0.0
+        self._bar = tqdm(total=epochs or None, unit=" epochs", dynamic_ncols=True) if sys.stderr.isatty() else None
+
+    def show(self, status: Status) -> None:
+        """Bring the display up to date."""
+        facts = (
+            f"{status.recent:.0%} of the last 50 episodes reached the light, {status.rate:.0f} ticks/s"
+            if status.phase != "waiting"
+            else f"waiting for {status.waiting_for} ({status.waited:.0f} s)"
+        )
+        if self._bar is not None:
+            self._bar.n = status.epoch
+            self._bar.set_postfix_str(facts, refresh=False)
+            self._bar.refresh()
+        elif time.monotonic() - self._said >= LINE_EVERY or status.phase == "finished":
+            self._said = time.monotonic()
+            total = f"/{status.epochs}" if status.epochs else ""
+            print(f"epoch {status.epoch}{total}  {facts}", file=sys.stderr, flush=True)
+
+    def say(self, text: str) -> None:
+        """One line of news."""
+        tqdm.write(text, file=sys.stderr)
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()

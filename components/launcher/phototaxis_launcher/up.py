@@ -1,0 +1,209 @@
+"""`phototaxis up`: the processes of a run, brought up, watched and ended together."""
+
+import json
+import secrets
+import signal
+import socket
+import sys
+import time
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta
+from phototaxis.bus import Bus
+from phototaxis.checkpoint import load
+from phototaxis.errors import ComponentFailed, UserError
+from phototaxis.messages import Status
+from phototaxis.options import Parser, add_options, convert, flags
+from phototaxis.session import BusOptions, open_session
+
+from phototaxis_launcher.processes import Child
+from phototaxis_launcher.progress import Progress
+
+PORT = Annotated[int, Meta(ge=-1, le=65535)]
+PATIENCE = {"recorder": 60.0, "agent": 15.0, "sensors": 5.0, "sim": 5.0}
+"""Seconds that a component gets to end; also the order in which they are ended."""
+STARTING = 60.0
+"""Seconds within which all components must be on the bus."""
+
+
+class UpOptions(BusOptions, kw_only=True):
+    """Options of a run. Every option of `phototaxis agent` is understood too and passed on to it."""
+
+    arena: str = "paper"
+    """name of a shipped arena, or a TOML file"""
+    seed: int = 0
+    """decides everything: placements, noise, the learner and its exploration"""
+    epochs: Annotated[int, Meta(ge=0)] = 3000
+    """learning steps; 0: run until stopped"""
+    speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
+    """simulated seconds per second; 0: lockstep, as fast as it goes"""
+    out: str = "runs"
+    """folder for the run's own folder: recording, checkpoint, logs"""
+    no_recorder: bool = False
+    """run without a recording and a viewer"""
+    grpc_port: PORT = 9876
+    """port of the recorder's Rerun server; 0: any free one"""
+    web_port: PORT = 9090
+    """port of the web viewer; 0: any free one; -1: no web viewer"""
+    json: bool = False
+    """print the result as one JSON object, last on standard output"""
+
+
+class Run:
+    """One run of the system."""
+
+    def __init__(self, options: UpOptions, agent_words: list[str]):
+        self._options = options
+        self.name = f"{datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
+        self.folder = Path(options.out).resolve() / self.name
+        try:
+            self.folder.mkdir(parents=True)
+        except OSError as error:
+            raise UserError(f"--out {options.out}: {error.strerror}") from None
+        self.checkpoint = self.folder / "checkpoint.npz"
+        self.recording = self.folder / "recording.rrd"
+        self.url = ""
+        bus = _bus_flags(options)
+        common = [f"--run={self.name}", f"--arena={options.arena}", f"--seed={options.seed}"]
+        self.children = {
+            "sim": self._child(
+                "sim", *bus, *common, f"--epochs={options.epochs}", f"--speed={options.speed}",
+                f"--journal={self.folder / 'sim.journal'}",
+            ),
+            "sensors": self._child("sensors", *bus),
+            "agent": self._child("agent", *bus, f"--checkpoint={self.checkpoint}", *agent_words),
+        }  # fmt: skip
+        if not options.no_recorder:
+            grpc, web = _port(options.grpc_port), _port(options.web_port)
+            self.children["recorder"] = self._child(
+                "recorder", *bus, f"--output={self.recording}", f"--grpc-port={grpc}", f"--web-port={web}"
+            )
+            if web > 0:
+                self.url = f"http://localhost:{web}/?url=rerun%2Bhttp%3A%2F%2Flocalhost%3A{grpc}%2Fproxy"
+
+    def _child(self, role: str, *arguments: str) -> Child:
+        return Child(role, f"phototaxis_{role}", list(arguments), self.folder)
+
+    def go(self, progress: Progress) -> Status:
+        """Start, watch until finished or stopped, end; the last status.
+
+        The agent is started when everyone else is on the bus, so that the recording has every tick.
+        """
+        status = Status(self.name, "waiting")
+        with open_session("observer", self._options) as session:
+            with Bus(session, self._options.name, "observer", f"up-{self.name}") as bus:
+                for number in (signal.SIGTERM, signal.SIGINT):
+                    signal.signal(number, lambda *_: bus.stop())
+                others = [role for role in self.children if role != "agent"]
+                try:
+                    for role in others:
+                        self.children[role].start()
+                    deadline = time.monotonic() + STARTING
+                    while status.phase != "finished":
+                        event = bus.receive(timeout=0.1)
+                        for child in self.children.values():
+                            if child.watch():
+                                progress.say(f"{child.role} died and was restarted; see {self.folder}")
+                        if event is None:
+                            pass
+                        elif event.topic == "stop":
+                            break
+                        elif event.topic == "status" and event.message.run == self.name:
+                            status = event.message
+                            progress.show(status)
+                        agent = self.children["agent"]
+                        if agent.process is None:
+                            present = {who.split("/")[0] for who in status.alive}
+                            if present.issuperset(others):
+                                agent.start()
+                                progress.say(f"watch at {self.url}" if self.url else "all components are up")
+                            elif time.monotonic() > deadline:
+                                missing = ", ".join(sorted(set(others) - present))
+                                raise ComponentFailed(
+                                    f"{missing} did not come up within {STARTING:g} s; see {self.folder}"
+                                )
+                finally:
+                    progress.close()
+                    self.stop()
+        return status
+
+    def stop(self) -> None:
+        """End every child; the recorder first, while those it still asks are alive."""
+        for role, patience in PATIENCE.items():
+            if role in self.children:
+                self.children[role].stop(patience)
+
+    def result(self, status: Status) -> dict[str, object]:
+        """What the run came to."""
+        meta = load(self.checkpoint)[0] if self.checkpoint.exists() else None
+        recordings = sorted(self.folder.glob("recording*.rrd"), key=lambda path: path.stat().st_mtime)
+        return {
+            "run": self.name,
+            "arena": self._options.arena,
+            "seed": self._options.seed,
+            "learner": meta.learner if meta else None,
+            "finished": status.phase == "finished",
+            "epochs": status.epoch,
+            "episodes": status.episodes,
+            "reached": status.reached,
+            "recent_success": status.recent,
+            "ticks": status.tick,
+            "ticks_per_second": round(status.mean_rate, 1),
+            "state_hash": status.hash,
+            "learner_hash": meta.learner_hash if meta else None,
+            "recording": str(recordings[-1]) if recordings else None,
+            "checkpoint": str(self.checkpoint) if meta else None,
+            "restarts": {role: child.restarts for role, child in self.children.items() if child.restarts},
+            "refused": status.refused,
+        }
+
+
+def parse(argv: Sequence[str]) -> tuple[UpOptions, list[str]]:
+    """Our own options, and the words for the agent."""
+    parser = Parser(
+        prog="phototaxis up",
+        description="Start simulation, sensors, agent and recorder, and watch over them.",
+        epilog="Options of `phototaxis agent` (see its --help) are passed on to the agent.",
+    )
+    add_options(parser, UpOptions)
+    own, words = parser.parse_known_args(argv)
+    return convert(UpOptions, vars(own)), words
+
+
+def main(argv: Sequence[str]) -> int:
+    options, words = parse(argv)
+    run = Run(options, words)
+    status = run.go(Progress(options.epochs))
+    result = run.result(status)
+    if options.json:
+        print(json.dumps(result), flush=True)
+    else:
+        summarise(result)
+    return 0
+
+
+def summarise(result: dict[str, object]) -> None:
+    """The result for a person, on stderr."""
+    lines = [
+        f"{result['epochs']} epochs, {result['episodes']} episodes, {result['reached']} of them reached the light; "
+        f"{result['ticks_per_second']} ticks/s",
+        f"recording   {result['recording']}",
+        f"checkpoint  {result['checkpoint']}",
+    ]
+    print("\n".join(lines), file=sys.stderr)
+
+
+def _bus_flags(options: UpOptions) -> list[str]:
+    only = BusOptions(**{field: getattr(options, field) for field in BusOptions.__struct_fields__})
+    return flags(only)
+
+
+def _port(port: int) -> int:
+    """The port itself, or a free one for 0."""
+    if port != 0:
+        return port
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return probe.getsockname()[1]

@@ -1,0 +1,72 @@
+"""`phototaxis recorder`: the recorder as a process."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import rerun as rr
+from msgspec import Meta
+from phototaxis.bus import Bus
+from phototaxis.component import ComponentOptions, entry, run
+from phototaxis.errors import UserError
+from phototaxis.messages import World
+from phototaxis.options import parse
+
+from phototaxis_recorder.server import Server
+from phototaxis_recorder.sinks import Page, fresh_file, live_url, open_recording, probe
+from phototaxis_recorder.translate import Translator
+
+
+class Options(ComponentOptions, kw_only=True):
+    """Options of the recorder."""
+
+    output: str = "recording.rrd"
+    """file to record into; where it stands already, the new one gets a number"""
+    bind: str = "127.0.0.1"
+    """address that the viewer's ports listen on"""
+    grpc_port: Annotated[int, Meta(ge=0, le=65535)] = 9876
+    """port of the live Rerun server; 0: any free one"""
+    web_port: Annotated[int, Meta(ge=-1, le=65535)] = 9090
+    """port of the web viewer's page; 0: any free one; -1: none"""
+    memory: Annotated[str, Meta(pattern=r"^[0-9]+(MB|GB|MiB|GiB)$")] = "256MiB"
+    """memory for viewers that come late, such as 256MiB"""
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    options = parse(Options, argv, "phototaxis recorder", "Record the run on the bus, live and on disk.")
+    output = Path(options.output)
+    if not output.parent.is_dir():
+        raise UserError(f"--output {output}: there is no folder {output.parent}")
+    grpc_port = probe(options.bind, options.grpc_port, "--grpc-port")
+    web_port = probe(options.bind, options.web_port, "--web-port") if options.web_port >= 0 else -1
+    recording: list[rr.RecordingStream] = []
+
+    def start(world: World) -> Translator:
+        file = fresh_file(output)
+        recording.append(
+            open_recording(world.run, world.arena, file, options.bind, grpc_port, options.memory)
+        )
+        return Translator(recording[0], world)
+
+    def finish() -> None:
+        while recording:
+            recording.pop().disconnect()
+
+    page = Page(options.bind, web_port, grpc_port) if web_port >= 0 else None
+    if page is not None:
+        print(f"recorder: watch at {live_url(web_port, grpc_port)}", file=sys.stderr, flush=True)
+
+    def serve(bus: Bus) -> None:
+        Server(bus, start, finish).serve()
+
+    try:
+        run("recorder", options, serve)
+    finally:
+        finish()
+        if page is not None:
+            page.close()
+
+
+if __name__ == "__main__":
+    entry(main)

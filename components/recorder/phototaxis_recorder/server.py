@@ -1,0 +1,96 @@
+"""The recorder on the bus: reads the log chunks, asks for those it missed, never touches the tick keys."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from phototaxis.bus import Bus
+from phototaxis.messages import Decoder, LogRequest, Refused, World
+from phototaxis.topics import TOPICS
+
+from phototaxis_recorder.translate import Translator
+
+FLUSH_EVERY = 0.15
+LOGS = ("log/sim", "log/sensors", "log/agent")
+
+
+class Server:
+    """Records whatever run is on the bus.
+
+    Parameters
+    ----------
+    start : called with the world of a run, begins a recording and returns its translator.
+    finish : called when a recording is to be closed.
+    """
+
+    def __init__(self, bus: Bus, start: Callable[[World], Translator], finish: Callable[[], None]):
+        self._bus, self._start, self._finish = bus, start, finish
+        self._run = ""
+        self._translator: Translator | None = None
+        self._expected: dict[str, tuple[str, int]] = {}
+        self._decoders = {name: Decoder(TOPICS[name].message, TOPICS[name].limit) for name in LOGS}
+
+    def serve(self) -> None:
+        """Record until a "stop" event; then take what is still to be had and close the recording."""
+        flush_at = 0.0
+        while True:
+            event = self._bus.receive(timeout=FLUSH_EVERY)
+            if event is not None:
+                if event.topic == "stop":
+                    break
+                if event.topic in LOGS:
+                    self._take(event.topic, event.message)
+                elif event.topic == "alive" and event.message[0] == "sim":
+                    self._meet()
+            now = time.monotonic()
+            if self._translator is not None and now >= flush_at:
+                self._translator.flush()
+                flush_at = now + FLUSH_EVERY
+        if self._translator is not None:
+            for topic in LOGS:
+                self._catch_up(topic, self._expected.get(topic, ("", 0))[1])
+            self._translator.flush()
+        self._finish()
+
+    def _meet(self) -> None:
+        """Begin a recording if there is a run that is not yet recorded."""
+        world = self._bus.ask_one("world", World)
+        if world is None or world.run == self._run:
+            return
+        if self._translator is not None:
+            self._translator.flush()
+            self._finish()
+        self._run, self._expected = world.run, {}
+        self._translator = self._start(world)
+
+    def _take(self, topic: str, chunk: Any) -> None:
+        """One chunk; what was missed before it is asked for first."""
+        if chunk.run != self._run:
+            self._meet()
+            if chunk.run != self._run:
+                return
+        writer, expected = self._expected.get(topic, ("", 0))
+        if chunk.writer != writer:
+            expected = 0
+        if chunk.seq > expected:
+            self._catch_up(topic, expected)
+        self._write(topic, chunk)
+
+    def _catch_up(self, topic: str, seq: int) -> None:
+        """Ask the writer for what it still has from a chunk on."""
+        for payload in self._bus.ask(topic, LogRequest(seq)):
+            try:
+                self._write(topic, self._decoders[topic](payload))
+            except Refused as why:
+                self._bus.refuse(topic, str(why))
+
+    def _write(self, topic: str, chunk: Any) -> None:
+        if chunk.run != self._run or self._translator is None:
+            return
+        writer, expected = self._expected.get(topic, ("", 0))
+        if chunk.writer == writer and chunk.seq < expected:
+            return
+        self._expected[topic] = chunk.writer, chunk.seq + 1
+        {"log/sim": self._translator.sim, "log/sensors": self._translator.sensors, "log/agent": self._translator.agent}[
+            topic
+        ](chunk)

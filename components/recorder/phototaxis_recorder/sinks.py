@@ -1,0 +1,71 @@
+"""Where a recording goes: a file, the live gRPC server, and a page with the web viewer."""
+
+import socket
+import subprocess
+from pathlib import Path
+
+import rerun as rr
+import rerun_cli
+from phototaxis.arena import Arena
+from phototaxis.errors import Unavailable
+
+from phototaxis_recorder.layout import blueprint
+
+
+def probe(host: str, port: int, flag: str) -> int:
+    """The port if it is free, or a free one for 0. Rerun itself would go on without a word.
+
+    Raises
+    ------
+    Unavailable
+        when it is taken.
+    """
+    try:
+        with socket.create_server((host, port)) as server:
+            return server.getsockname()[1]
+    except OSError as error:
+        raise Unavailable(
+            f"port {port} on {host} is not free ({error.strerror}); choose another with {flag} (0: any free one)"
+        ) from None
+
+
+def open_recording(run: str, arena: Arena, file: Path, host: str, grpc_port: int, memory: str) -> rr.RecordingStream:
+    """A recording that goes to a file and to a live server at the same time."""
+    recording = rr.RecordingStream("phototaxis", recording_id=f"{run}-{file.stem}")
+    rr.set_log_time_enabled(False)
+    server = rr.GrpcServerSink(host, grpc_port, server_memory_limit=memory)
+    recording.set_sinks(server, rr.FileSink(str(file)), default_blueprint=blueprint(arena))
+    recording.send_recording_name(f"{arena.name}, {run}")
+    return recording
+
+
+def fresh_file(wanted: Path) -> Path:
+    """`wanted`, or the same with -2, -3, … where a file stands already: no recording is overwritten."""
+    file, number = wanted, 1
+    while file.exists():
+        number += 1
+        file = wanted.with_name(f"{wanted.stem}-{number}{wanted.suffix}")
+    return file
+
+
+class Page:
+    """The web viewer's page, served by Rerun's own program on one address."""
+
+    def __init__(self, host: str, port: int, grpc_port: int):
+        program = Path(rerun_cli.__file__).parent / "rerun"
+        source = f"rerun+http://localhost:{grpc_port}/proxy"
+        self._process = subprocess.Popen(
+            [program, "--serve-web", "--bind", host, "--web-viewer-port", str(port), source],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def close(self) -> None:
+        self._process.terminate()
+        self._process.wait()
+
+
+def live_url(web_port: int, grpc_port: int) -> str:
+    """What to open in a browser on this machine."""
+    return f"http://localhost:{web_port}/?url=rerun%2Bhttp%3A%2F%2Flocalhost%3A{grpc_port}%2Fproxy"

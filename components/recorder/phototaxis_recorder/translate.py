@@ -1,0 +1,128 @@
+"""From log chunks to Rerun columns: each tick once, in batches, whoever resends what."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
+from phototaxis.task import ACTIONS, PERCEPTS
+
+from phototaxis_recorder.layout import draw_world
+
+WORDS = {"reached": "reached the light", "cap": "gave up", "asked": "was reset"}
+
+
+class Translator:
+    """Writes one run into one Rerun recording.
+
+    Chunks are buffered by `add` and written by `flush`; a tick that a role has told already is left out.
+    """
+
+    def __init__(self, recording: rr.RecordingStream, world: World):
+        self._recording, self._period = recording, world.arena.motion.control_period
+        angles = np.array([sonar.angle for sonar in world.arena.robot.sonars])
+        self._aim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        self._mounts = np.array([sonar.position for sonar in world.arena.robot.sonars])
+        self._newest = {"sim": -1, "sensors": -1, "agent": -1}
+        self._rows: dict[str, list[tuple[Any, ...]]] = {"sim": [], "sensors": [], "agent": []}
+        self._episodes: list[Episode] = []
+        self._episode = -1
+        self._recent: deque[bool] = deque(maxlen=50)
+        self._driver = ""
+        draw_world(recording, world.arena)
+
+    def sim(self, chunk: SimLog) -> None:
+        """Poses, commands and ended episodes."""
+        self._add("sim", chunk.tick, chunk.x, chunk.y, chunk.heading)
+        if chunk.driver != self._driver and chunk.tick:
+            self._driver = chunk.driver
+            self._text(chunk.tick[0], f"{self._driver or 'nobody'} drives")
+        self._episodes += [episode for episode in chunk.ended if episode.episode > self._episode]
+        if self._episodes:
+            self._episode = self._episodes[-1].episode
+
+    def sensors(self, chunk: SensorsLog) -> None:
+        """Sonar and light."""
+        sonar, light = np.reshape(chunk.sonar, (-1, 16)), np.reshape(chunk.light, (-1, 2))
+        self._add("sensors", chunk.tick, sonar, light)
+
+    def agent(self, chunk: AgentLog) -> None:
+        """Percepts, rewards and what is learned."""
+        self._add("agent", chunk.tick, chunk.reward, chunk.td_error, chunk.temperature, chunk.action)
+        if chunk.values:
+            self._learned(chunk)
+
+    def flush(self) -> None:
+        """Write what is buffered."""
+        if rows := self._take("sim"):
+            tick, x, y, heading = rows
+            place = np.stack([x, y, np.zeros_like(x)], axis=1)
+            turn = np.zeros((len(tick), 4))
+            turn[:, 2], turn[:, 3] = np.sin(heading / 2), np.cos(heading / 2)
+            self._send("world/robot", tick, rr.Transform3D.columns(translation=place, quaternion=turn))
+            self._send("world/trail", tick, rr.Points2D.columns(positions=place[:, :2]))
+        if rows := self._take("sensors"):
+            tick, sonar, light = rows
+            rays = (sonar[:, :, None] * self._aim).reshape(-1, 2)
+            starts = np.tile(self._mounts, (len(tick), 1))
+            arrows = rr.Arrows2D.columns(vectors=rays, origins=starts).partition([16] * len(tick))
+            self._send("world/robot/sonar", tick, arrows)
+            self._send("plots/light/left", tick, rr.Scalars.columns(scalars=light[:, 0]))
+            self._send("plots/light/right", tick, rr.Scalars.columns(scalars=light[:, 1]))
+        if rows := self._take("agent"):
+            tick, reward, error, temperature, action = rows
+            self._send("plots/reward", tick, rr.Scalars.columns(scalars=reward))
+            self._send("plots/td_error", tick, rr.Scalars.columns(scalars=error))
+            self._send("plots/temperature", tick, rr.Scalars.columns(scalars=temperature))
+            self._send("plots/action", tick, rr.Scalars.columns(scalars=action))
+        for episode in self._episodes:
+            self._recent.append(episode.end == "reached")
+            steps = "step" if episode.steps == 1 else "steps"
+            self._text(
+                episode.tick,
+                f"episode {episode.episode}: {episode.driver or 'nobody'} {WORDS.get(episode.end, episode.end)} "
+                f"after {episode.steps} {steps}",
+            )
+            self._at(episode.tick)
+            rate = sum(self._recent) / len(self._recent)
+            rr.log("plots/success", rr.Scalars(rate), recording=self._recording)
+        self._episodes.clear()
+
+    def _add(self, role: str, ticks: Sequence[int], *columns: Sequence[Any] | np.ndarray) -> None:
+        newest = self._newest[role]
+        for row in zip(ticks, *columns, strict=True):
+            if row[0] > newest:
+                self._rows[role].append(row)
+                newest = row[0]
+        self._newest[role] = newest
+
+    def _take(self, role: str) -> list[np.ndarray]:
+        rows, self._rows[role] = self._rows[role], []
+        return [np.array(column) for column in zip(*rows, strict=True)]
+
+    def _send(self, path: str, tick: np.ndarray, columns: Any) -> None:
+        index = [
+            rr.TimeColumn("tick", sequence=tick),
+            rr.TimeColumn("sim_time", duration=tick * self._period),
+        ]
+        rr.send_columns(path, index, columns, recording=self._recording)
+
+    def _learned(self, chunk: AgentLog) -> None:
+        self._at(chunk.tick[-1])
+        table = np.reshape(chunk.values, (-1, len(ACTIONS))).astype(np.float32)
+        sizes = PERCEPTS[chunk.percept].sizes
+        if math.prod(sizes) == len(table):
+            log = self._recording
+            rr.log("learner/table", rr.Tensor(table, dim_names=["state", "action"]), recording=log)
+            rr.log("learner/visits", rr.BarChart(np.array(chunk.visits)), recording=log)
+
+    def _text(self, tick: int, text: str) -> None:
+        self._at(tick)
+        rr.log("episodes", rr.TextLog(text), recording=self._recording)
+
+    def _at(self, tick: int) -> None:
+        self._recording.set_time("tick", sequence=tick)
+        self._recording.set_time("sim_time", duration=tick * self._period)
