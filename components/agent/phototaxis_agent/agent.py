@@ -140,8 +140,8 @@ class Agent:
         )
         return meta, arrays
 
-    def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
-        """Continue from a checkpoint; in another run what was learned counts, the percept's history does not.
+    def take_over(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
+        """Take over what was learned, and nothing else.
 
         Raises
         ------
@@ -156,11 +156,24 @@ class Agent:
                 raise UserError(f"{source}: a checkpoint of the {what} '{theirs}', but '{ours}' is asked for")
         try:
             self.learner.load(arrays)
+        except (KeyError, TypeError, ValueError) as error:
+            raise UserError(f"{source}: does not fit the {self.name} learner: {error}") from None
+
+    def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
+        """Continue from a checkpoint, bit for bit; in another run the percept's history does not count.
+
+        Raises
+        ------
+        UserError
+            as in `take_over`.
+        """
+        self.take_over(meta, arrays, source)
+        try:
             self._rng.bit_generator.state = _map_numbers(_number, meta.random)
             self.visits[:] = meta.visits
         except (KeyError, TypeError, ValueError) as error:
             raise UserError(f"{source}: does not fit the {self.name} learner: {error}") from None
-        self.epoch = meta.epoch
+        self.epoch, self.budget = meta.epoch, max(meta.budget, self.budget)
         self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
         self._memory.lights.extend(meta.lights)
         self._state, self._brightest = meta.state or None, meta.brightest

@@ -2,9 +2,12 @@
 
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Any
 
-from msgspec import Meta, Struct
+import msgspec
+from msgspec import Struct
+from phototaxis.checkpoint import Meta
+from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse_groups, peek
 from phototaxis.task import TaskOptions
@@ -49,7 +52,24 @@ class Setup(Struct):
 DEFAULT_BUDGET = 3000
 """Epochs that the temperature's decay is spread over in a run without an end."""
 
-Epochs = Annotated[int, Meta(ge=0)]
+def from_checkpoint(meta: Meta, source: str) -> Setup:
+    """The setup that a checkpoint was made with.
+
+    Raises
+    ------
+    UserError
+        when its values do not fit; `source` names it.
+    """
+    try:
+        return Setup(
+            meta.learner,
+            msgspec.convert(meta.hyperparameters, find(meta.learner).Options),
+            msgspec.convert({"percept": meta.percept, "reward": meta.reward, "cap": meta.cap}, TaskOptions),
+            msgspec.convert(meta.exploration, Exploration),
+        )
+    except msgspec.ValidationError as error:
+        raise UserError(f"{source}: {error}") from None
+
 
 
 def parse_setup(struct: type[Any], argv: Sequence[str] | None, prog: str, about: str) -> tuple[Any, Setup]:

@@ -1,13 +1,21 @@
 """How good is a frozen policy? Measured on fresh random placements."""
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
 
+import msgspec
 import numpy as np
-from msgspec import Struct
+from msgspec import Meta, Struct
 from phototaxis.arena import Arena
-from phototaxis.messages import Episode
+from phototaxis.checkpoint import load
+from phototaxis.messages import Episode, World
+from phototaxis.options import parse
 from phototaxis.task import REACHED
 from phototaxis_agent.agent import Agent
+from phototaxis_agent.setup import from_checkpoint
+from phototaxis_sim import arenas
 
 from phototaxis_lab.loop import Loop
 
@@ -66,3 +74,58 @@ def evaluate(arena: Arena, agent: Agent, placements: int, seed: int) -> Evaluati
         cap=agent.task.cap,
         seed=seed,
     )
+
+
+class Options(Struct, kw_only=True):
+    """Options of `phototaxis evaluate`."""
+
+    checkpoint: str
+    """checkpoint (.npz) whose policy is measured"""
+    placements: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
+    """fresh random placements"""
+    seed: int = 1
+    """decides the placements and the policy's draws; never those of a training"""
+    arena: str = ""
+    """another arena than the one of the training"""
+    cap: Annotated[int, Meta(ge=1)] | None = None
+    """another step cap than the training's"""
+    json: bool = False
+    """print the result as one JSON object"""
+
+
+def from_file(options: Options) -> Evaluation:
+    """Evaluate the policy in a checkpoint.
+
+    Raises
+    ------
+    UserError
+        when the checkpoint or the arena cannot be used.
+    """
+    path = Path(options.checkpoint)
+    meta, arrays = load(path)
+    arena = arenas.load(options.arena or meta.arena)
+    if options.cap is not None:
+        meta.cap = options.cap
+    setup = from_checkpoint(meta, str(path))
+    agent = setup.agent(World("evaluation", arena, options.seed + SEED_OFFSET, 0), learning=False)
+    agent.take_over(meta, arrays, str(path))
+    return evaluate(arena, agent, options.placements, options.seed)
+
+
+def main(argv: Sequence[str]) -> int:
+    about = "Freeze the policy of a checkpoint and measure it on fresh random placements."
+    options = parse(Options, argv, "phototaxis evaluate", about, positional=["checkpoint"])
+    found = from_file(options)
+    if options.json:
+        print(msgspec.json.encode(found).decode())
+    else:
+        print(describe(found))
+    return 0
+
+
+def describe(found: Evaluation) -> str:
+    """An evaluation in words."""
+    words = f"{found.success_rate:.1%} of {found.placements} fresh placements reached the light within {found.cap} steps"
+    if found.steps_mean is not None:
+        words += f"; {found.steps_mean:.1f} steps on average, {found.path_ratio:.1f} × the straight line"
+    return words

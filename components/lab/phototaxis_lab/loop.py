@@ -21,8 +21,6 @@ class Loop:
         self.simulation.advance(command.left, command.right, command.author, command.end)
         return self.simulation.ended
 
-    def run(self) -> None:
-        """All epochs; the agent also learns from the state that the last one led to."""
-        while not self.simulation.finished:
-            self.step()
+    def finish(self) -> None:
+        """After the last epoch: the agent also learns from the state that it led to."""
         self.agent(self.sensors(self.simulation.state))

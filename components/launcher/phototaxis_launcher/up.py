@@ -161,10 +161,10 @@ class Run:
         }
 
 
-def parse(argv: Sequence[str]) -> tuple[UpOptions, list[str]]:
+def parse(argv: Sequence[str], prog: str = "phototaxis up") -> tuple[UpOptions, list[str]]:
     """Our own options, and the words for the agent."""
     parser = Parser(
-        prog="phototaxis up",
+        prog=prog,
         description="Start simulation, sensors, agent and recorder, and watch over them.",
         epilog="Options of `phototaxis agent` (see its --help) are passed on to the agent.",
     )
