@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 from phototaxis.bus import Bus
@@ -18,6 +18,14 @@ from phototaxis_agent.agent import Agent
 TABLE_EVERY = 0.5
 SAVE_EVERY = 10.0
 CLAIM_EVERY = 0.2
+
+
+class Session(NamedTuple):
+    """The agent in one run."""
+
+    world: World
+    agent: Agent
+    answer: Once[Command]
 
 
 class Server:
@@ -36,9 +44,7 @@ class Server:
     ):
         self._bus, self._make, self._path, self._resume, self._required = bus, make, path, resume, required
         self._journal = None if path is None else Journal(path.with_suffix(".journal"))
-        self._world: World | None = None
-        self._agent: Agent | None = None
-        self._once: Once[Command] | None = None
+        self._session: Session | None = None
         self._save_at = self._table_at = self._claim_at = 0.0
         self._saved: tuple[str, int] = ("", -1)
         self._log = Chunks(bus, "log/agent", self._chunk)
@@ -56,77 +62,76 @@ class Server:
             elif event.topic == "stop":
                 break
         self._log.flush()
-        if self._agent is not None:
+        if self._session is not None:
             self._bus.control(Control("release", self._bus.ident), timeout=0.5)
-            self._save()
+            self._save(self._session.agent)
 
     def _readings(self, readings: Readings) -> None:
-        now = time.monotonic()
-        if readings.driver != self._bus.ident:
-            if not readings.driver and now >= self._claim_at and self._meet(readings.run):
-                self._claim_at = now + CLAIM_EVERY
-                self._bus.control(Control("claim", self._bus.ident))
+        session = self._meet(readings.run)
+        if session is None:
             return
-        if not self._meet(readings.run):
-            return
-        assert self._once is not None
-        assert self._agent is not None
-        assert self._world is not None
-        fresh = (readings.run, readings.tick) != self._agent.tick
+        if readings.driver == self._bus.ident:
+            self._drive(session, readings)
+        elif not readings.driver and time.monotonic() >= self._claim_at:
+            self._claim_at = time.monotonic() + CLAIM_EVERY
+            self._bus.control(Control("claim", self._bus.ident))
+
+    def _drive(self, session: Session, readings: Readings) -> None:
+        """Answer one tick: first to the journal, then to the learner, then to the bus."""
+        agent = session.agent
+        fresh = (readings.run, readings.tick) != agent.tick
         if fresh and self._journal is not None:
             self._journal.append(msgspec.msgpack.encode(readings))
-        command = self._once(readings)
+        command = session.answer(readings)
         if command is None:
             return
-        if 0 < self._world.epochs <= readings.epoch:
-            self._save()  # before the last answer: who sees the run finished finds the checkpoint
+        if 0 < session.world.epochs <= readings.epoch:
+            self._save(agent)  # before the last answer: who sees the run finished finds the checkpoint
         self._bus.put("command", command)
         if fresh:
-            self._record(now)
-            if now >= self._save_at:
-                self._save()
+            self._record(agent)
+            if time.monotonic() >= self._save_at:
+                self._save(agent)
 
-    def _meet(self, run: str) -> bool:
-        """Be ready for a run; False when its world is not to be had now."""
-        if self._world is not None and self._world.run == run:
-            return True
+    def _meet(self, run: str) -> Session | None:
+        """The agent, ready for a run; None when its world is not to be had now."""
+        if self._session is not None and self._session.world.run == run:
+            return self._session
         world = self._bus.ask_one("world", World)
         if world is None or world.run != run:
-            return False
+            return None
         self._log.flush()
-        self._world = world
-        if self._agent is None:
-            self._agent = self._make(world)
-            self._agent.author = self._bus.ident
+        if self._session is None:
+            agent = self._make(world)
+            agent.author = self._bus.ident
             if self._resume is not None and (self._required or self._resume.exists()):
-                self._agent.restore(*load(self._resume), source=str(self._resume))
-        self._once = Once(self._agent)
-        self._replay(run)
+                agent.restore(*load(self._resume), source=str(self._resume))
+        else:
+            agent = self._session.agent
+        self._session = Session(world, agent, Once(agent))
+        self._replay(self._session)
         self._save_at = time.monotonic() + SAVE_EVERY
-        return True
+        return self._session
 
-    def _replay(self, run: str) -> None:
-        """Go through the journal's readings again where they are of this run; else begin a new journal."""
+    def _replay(self, session: Session) -> None:
+        """Go through the journal's readings again where they are of this run; begin a new journal."""
         if self._journal is None:
             return
-        assert self._agent is not None
-        assert self._once is not None
+        run = session.world.run
         frames = self._journal.read() if self._resume is not None else []
-        if not frames or frames[0] != run.encode():
-            self._journal.begin(run.encode())
-            return
         self._journal.begin(run.encode())
-        seen, tick = self._agent.tick
+        if not frames or frames[0] != run.encode():
+            return
+        seen, tick = session.agent.tick
         for frame in frames[1:]:
             readings = msgspec.msgpack.decode(frame, type=Readings)
             if seen != run or readings.tick > tick:
                 self._journal.append(frame)
-                self._once(readings)
-                self._record(time.monotonic())
+                session.answer(readings)
+                self._record(session.agent)
 
-    def _save(self) -> None:
-        agent = self._agent
-        if agent is None or self._path is None or agent.tick == self._saved:
+    def _save(self, agent: Agent) -> None:
+        if self._path is None or agent.tick == self._saved:
             return
         save(self._path, *agent.checkpoint())
         self._saved = agent.tick
@@ -134,16 +139,18 @@ class Server:
             self._journal.begin(agent.tick[0].encode())
         self._save_at = time.monotonic() + SAVE_EVERY
 
-    def _record(self, now: float) -> None:
-        assert self._agent is not None
-        self._log.add((self._agent.tick[1], *self._agent.last), now)
+    def _record(self, agent: Agent) -> None:
+        self._log.add((agent, agent.tick[1], *agent.last), time.monotonic())
 
     def _chunk(self, seq: int, columns: list[Any]) -> AgentLog:
-        agent = self._agent
-        assert agent is not None
-        table: tuple[list[float], list[int]] = ([], [])
+        agents, tick, state, action, reward, error, temperature = columns
+        agent: Agent = agents[0]
+        log = AgentLog(
+            agent.tick[0], seq, self._bus.ident, agent.name, agent.task.percept,
+            tick, state, action, reward, error, temperature,
+        )  # fmt: skip
         now = time.monotonic()
         if now >= self._table_at:
             self._table_at = now + TABLE_EVERY
-            table = agent.table(), agent.visits.tolist()
-        return AgentLog(agent.tick[0], seq, self._bus.ident, agent.name, agent.task.percept, *columns, *table)
+            log.values, log.visits = agent.table(), agent.visits.tolist()
+        return log

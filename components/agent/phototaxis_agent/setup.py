@@ -52,6 +52,7 @@ class Setup(Struct):
 DEFAULT_BUDGET = 3000
 """Epochs that the temperature's decay is spread over in a run without an end."""
 
+
 def from_checkpoint(meta: Meta, source: str) -> Setup:
     """The setup that a checkpoint was made with.
 
@@ -69,7 +70,6 @@ def from_checkpoint(meta: Meta, source: str) -> Setup:
         )
     except msgspec.ValidationError as error:
         raise UserError(f"{source}: {error}") from None
-
 
 
 def parse_setup(struct: type[Any], argv: Sequence[str] | None, prog: str, about: str) -> tuple[Any, Setup]:

@@ -57,9 +57,7 @@ class Bus:
             if topic.writer == role:
                 self._offer(topic)
         watch = self._callback("token")
-        self._declared.append(
-            session.liveliness().declare_subscriber(alive_key(name, "*", "*"), watch, history=True)
-        )
+        self._declared.append(session.liveliness().declare_subscriber(alive_key(name, "*", "*"), watch, history=True))
         self._declared.append(session.liveliness().declare_token(alive_key(name, role, ident)))
 
     def put(self, topic: str, message: Message | bytes) -> None:

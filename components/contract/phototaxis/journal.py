@@ -46,7 +46,8 @@ class Journal:
 
     def append(self, payload: bytes) -> None:
         """Add one entry."""
-        assert self._file is not None, "begin() comes first"
+        if self._file is None:
+            raise ValueError("begin() comes first")
         os.write(self._file, _FRAME.pack(len(payload), zlib.crc32(payload)) + payload)
 
     def close(self) -> None:

@@ -8,13 +8,14 @@ import textwrap
 import types
 import typing
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import msgspec
 
 from phototaxis.errors import UserError
 
-T = TypeVar("T")
+T = TypeVar("T", bound=msgspec.Struct)
 
 
 @functools.cache
@@ -27,7 +28,7 @@ def field_help(struct: type) -> dict[str, str]:
         except (OSError, TypeError):
             continue
         statements = getattr(body, "body", [])
-        for before, after in zip(statements, statements[1:], strict=False):
+        for before, after in pairwise(statements):
             if (
                 isinstance(before, ast.AnnAssign)
                 and isinstance(before.target, ast.Name)
@@ -57,9 +58,7 @@ def add_options(parser: Any, struct: type, positional: Sequence[str] = ()) -> No
         elif plain is bool:
             parser.add_argument(flag, help=help_text, action="store_true", default=argparse.SUPPRESS)
         elif typing.get_origin(plain) is list:
-            parser.add_argument(
-                flag, help=help_text, action="append", default=argparse.SUPPRESS, metavar=metavar
-            )
+            parser.add_argument(flag, help=help_text, action="append", default=argparse.SUPPRESS, metavar=metavar)
         else:
             parser.add_argument(flag, help=help_text, default=argparse.SUPPRESS, metavar=metavar)
 
@@ -106,9 +105,7 @@ class Parser(argparse.ArgumentParser):
         raise UserError(f"{message} (see {self.prog} --help)")
 
 
-def parse(
-    struct: type[T], argv: Sequence[str] | None, prog: str, about: str, positional: Sequence[str] = ()
-) -> T:
+def parse(struct: type[T], argv: Sequence[str] | None, prog: str, about: str, positional: Sequence[str] = ()) -> T:
     """Read a command line into a Struct."""
     return parse_groups({"": struct}, argv, prog, about, positional)[0]
 

@@ -86,9 +86,9 @@ class Simple:
     """
 
     name = "simple"
-    sizes = (3, 2, 2, 2)
+    sizes: tuple[int, ...] = (3, 2, 2, 2)
     variables = "wxyz"
-    actions = tuple(range(len(ACTIONS)))
+    actions: tuple[int, ...] = tuple(range(len(ACTIONS)))
 
     def state(self, readings: Readings, unchanged: bool, near: float) -> State:
         left, right = readings.light
@@ -107,9 +107,9 @@ class Rich:
     """
 
     name = "rich"
-    sizes = (5, 5, 2, 2, 2, 2)
+    sizes: tuple[int, ...] = (5, 5, 2, 2, 2, 2)
     variables = "uvwxyz"
-    actions = FORWARD
+    actions: tuple[int, ...] = FORWARD
 
     def state(self, readings: Readings, unchanged: bool, near: float) -> State:
         left, right = readings.light

@@ -125,7 +125,9 @@ def main(argv: Sequence[str]) -> int:
 
 def describe(found: Evaluation) -> str:
     """An evaluation in words."""
-    words = f"{found.success_rate:.1%} of {found.placements} fresh placements reached the light within {found.cap} steps"
+    words = (
+        f"{found.success_rate:.1%} of {found.placements} fresh placements reached the light within {found.cap} steps"
+    )
     if found.steps_mean is not None:
         words += f"; {found.steps_mean:.1f} steps on average, {found.path_ratio:.1f} × the straight line"
     return words

@@ -22,7 +22,9 @@ class Verb(NamedTuple):
 VERBS = {
     "demo": Verb("phototaxis_launcher.demo:main", "all", "learn 3,000 epochs over the bus, watch, evaluate"),
     "up": Verb("phototaxis_launcher.up:main", "launcher", "start a run: sim, sensors, agent, recorder"),
-    "status": Verb("phototaxis_launcher.ask:status", "launcher", "who is alive, which tick, who drives, what is awaited"),
+    "status": Verb(
+        "phototaxis_launcher.ask:status", "launcher", "who is alive, which tick, who drives, what is awaited"
+    ),
     "control": Verb("phototaxis_launcher.ask:control", "launcher", "pause, resume, step, speed, reset, stop"),
     "sim": Verb("phototaxis_sim.__main__:main", "sim", "the simulation alone"),
     "sensors": Verb("phototaxis_sensors.__main__:main", "sensors", "the sensors alone"),
@@ -58,7 +60,8 @@ def _load(name: str, verb: Verb) -> Callable[[list[str]], int | None]:
         return getattr(import_module(module), function)
     except ModuleNotFoundError as error:
         raise UserError(
-            f"'phototaxis {name}' needs the package {error.name}; install it with: pip install 'phototaxis[{verb.extra}]'"
+            f"'phototaxis {name}' needs the package {error.name}; "
+            f"install it with: pip install 'phototaxis[{verb.extra}]'"
         ) from None
 
 

@@ -4,8 +4,10 @@ import json
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from phototaxis.errors import ComponentFailed
+
 from phototaxis_launcher import up
 from phototaxis_launcher.progress import Progress
 
@@ -32,8 +34,8 @@ within {found["cap"]} steps. The paper reports "upwards of 80%" for this system 
 
   watched at  {run.url or "(no viewer)"}
   recording   {result["recording"]}
-              look again: {sys.executable.removesuffix("python")}rerun {result["recording"]}
+              look again: {Path(sys.executable).parent / "rerun"} {result["recording"]}
   checkpoint  {result["checkpoint"]}
-              measure again: phototaxis evaluate {result["checkpoint"]}"""
+              measure again: {Path(sys.executable).parent / "phototaxis"} evaluate {result["checkpoint"]}"""
     )
     return 0

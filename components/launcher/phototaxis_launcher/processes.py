@@ -60,7 +60,8 @@ class Child:
         self._deaths.append(time.monotonic())
         if len(self._deaths) > RESTARTS and self._deaths[-1] - self._deaths[0] < WITHIN:
             raise ComponentFailed(
-                f"{self.role} died {len(self._deaths)} times, last with {_meaning(code)}; its last words:\n{self.tail(20)}"
+                f"{self.role} died {len(self._deaths)} times, last with {_meaning(code)}; "
+                f"its last words:\n{self.tail(20)}"
             )
         self.restarts += 1
         self.start("--restarted")
@@ -75,7 +76,10 @@ class Child:
             try:
                 self.process.wait(patience)
             except subprocess.TimeoutExpired:
-                print(f"phototaxis: {self.role} did not end within {patience:g} s and was killed", file=sys.stderr)
+                print(
+                    f"phototaxis: {self.role} did not end within {patience:g} s and was killed",
+                    file=sys.stderr,
+                )
                 self.process.kill()
                 self.process.wait()
         if self.process.stdin is not None:

@@ -93,42 +93,47 @@ class Run:
         The agent is started when everyone else is on the bus, so that the recording has every tick.
         """
         status = Status(self.name, "waiting")
-        with open_session("observer", self._options) as session:
-            with Bus(session, self._options.name, "observer", f"up-{self.name}") as bus:
-                for number in (signal.SIGTERM, signal.SIGINT):
-                    signal.signal(number, lambda *_: bus.stop())
-                others = [role for role in self.children if role != "agent"]
-                try:
-                    for role in others:
-                        self.children[role].start()
-                    deadline = time.monotonic() + STARTING
-                    while status.phase != "finished":
-                        event = bus.receive(timeout=0.1)
-                        for child in self.children.values():
-                            if child.watch():
-                                progress.say(f"{child.role} died and was restarted; see {self.folder}")
-                        if event is None:
-                            pass
-                        elif event.topic == "stop":
-                            break
-                        elif event.topic == "status" and event.message.run == self.name:
-                            status = event.message
-                            progress.show(status)
-                        agent = self.children["agent"]
-                        if agent.process is None:
-                            present = {who.split("/")[0] for who in status.alive}
-                            if present.issuperset(others):
-                                agent.start()
-                                progress.say(f"watch at {self.url}" if self.url else "all components are up")
-                            elif time.monotonic() > deadline:
-                                missing = ", ".join(sorted(set(others) - present))
-                                raise ComponentFailed(
-                                    f"{missing} did not come up within {STARTING:g} s; see {self.folder}"
-                                )
-                finally:
-                    progress.close()
-                    self.stop()
+        observer = f"up-{self.name}"
+        with (
+            open_session("observer", self._options) as session,
+            Bus(session, self._options.name, "observer", observer) as bus,
+        ):
+            for number in (signal.SIGTERM, signal.SIGINT):
+                signal.signal(number, lambda *_: bus.stop())
+            try:
+                for role, child in self.children.items():
+                    if role != "agent":
+                        child.start()
+                deadline = time.monotonic() + STARTING
+                while status.phase != "finished":
+                    event = bus.receive(timeout=0.1)
+                    self._watch(progress)
+                    if event is not None and event.topic == "stop":
+                        break
+                    if event is not None and event.topic == "status" and event.message.run == self.name:
+                        status = event.message
+                        progress.show(status)
+                    if self.children["agent"].process is None:
+                        self._start_agent(status, deadline, progress)
+            finally:
+                progress.close()
+                self.stop()
         return status
+
+    def _watch(self, progress: Progress) -> None:
+        for child in self.children.values():
+            if child.watch():
+                progress.say(f"{child.role} died and was restarted; see {self.folder}")
+
+    def _start_agent(self, status: Status, deadline: float, progress: Progress) -> None:
+        present = {who.split("/")[0] for who in status.alive}
+        missing = self.children.keys() - present - {"agent"}
+        if not missing:
+            self.children["agent"].start()
+            progress.say(f"watch at {self.url}" if self.url else "all components are up")
+        elif time.monotonic() > deadline:
+            who = ", ".join(sorted(missing))
+            raise ComponentFailed(f"{who} did not come up within {STARTING:g} s; see {self.folder}")
 
     def stop(self) -> None:
         """End every child; the recorder first, while those it still asks are alive."""
@@ -170,7 +175,10 @@ def parse(argv: Sequence[str], prog: str = "phototaxis up") -> tuple[UpOptions, 
     )
     add_options(parser, UpOptions)
     own, words = parser.parse_known_args(argv)
-    return convert(UpOptions, vars(own)), words
+    options = convert(UpOptions, vars(own))
+    if options.listen:
+        raise UserError(f"--listen is for single components; {prog} links its own, or uses a router with --connect")
+    return options, words
 
 
 def main(argv: Sequence[str]) -> int:

@@ -37,7 +37,9 @@ def blueprint(arena: Arena) -> rrb.Blueprint:
             rrb.Vertical(world, rrb.TextLogView(origin="/episodes", name="Episodes"), row_shares=[4, 1]),
             rrb.Vertical(
                 rrb.TimeSeriesView(
-                    origin="/plots/success", name="Success, last 50 episodes", axis_y=rrb.ScalarAxis(range=(0.0, 1.0))
+                    origin="/plots/success",
+                    name="Success, last 50 episodes",
+                    axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
                 ),
                 rrb.TimeSeriesView(origin="/plots/reward", name="Reward", time_ranges=recent),
                 rrb.TimeSeriesView(origin="/plots/light", name="Light, left and right", time_ranges=recent),
@@ -81,7 +83,10 @@ def draw_world(recording: rr.RecordingStream, arena: Arena) -> None:
         log("world/polygons", rr.LineStrips2D(strips, colors=stone, radii=0.03))
     if arena.discs:
         discs = arena.discs
-        log("world/discs", rr.Points2D([d.centre for d in discs], radii=[d.radius for d in discs], colors=stone))
+        log(
+            "world/discs",
+            rr.Points2D([d.centre for d in discs], radii=[d.radius for d in discs], colors=stone),
+        )
     places = [light.position for light in arena.lights]
     log("world/light", rr.Points2D(places, colors=yellow, radii=0.14, labels=["light"] * len(places)))
     robot = arena.robot

@@ -91,6 +91,8 @@ class Server:
         if chunk.writer == writer and chunk.seq < expected:
             return
         self._expected[topic] = chunk.writer, chunk.seq + 1
-        {"log/sim": self._translator.sim, "log/sensors": self._translator.sensors, "log/agent": self._translator.agent}[
-            topic
-        ](chunk)
+        {
+            "log/sim": self._translator.sim,
+            "log/sensors": self._translator.sensors,
+            "log/agent": self._translator.agent,
+        }[topic](chunk)

@@ -27,9 +27,7 @@ class LightModel:
         )
         return left, right
 
-    def _one(
-        self, light: Light, sensor: tuple[float, float], x: float, y: float, cos: float, sin: float
-    ) -> float:
+    def _one(self, light: Light, sensor: tuple[float, float], x: float, y: float, cos: float, sin: float) -> float:
         """What one light gives to one sensor."""
         dx, dy = light.position[0] - x, light.position[1] - y
         lx, ly = cos * dx + sin * dy, cos * dy - sin * dx  # the light in the robot's frame
@@ -40,7 +38,10 @@ class LightModel:
         if distance > _SHORT:
             eye = x + cos * sx - sin * sy, y + sin * sx + cos * sy
             share = 1 - _SHORT / distance
-            lamp = eye[0] + share * (light.position[0] - eye[0]), eye[1] + share * (light.position[1] - eye[1])
+            lamp = (
+                eye[0] + share * (light.position[0] - eye[0]),
+                eye[1] + share * (light.position[1] - eye[1]),
+            )
             if self._scene.blocked(eye, lamp):
                 return 0.0
         return light.brightness * self._falloff(distance)

@@ -1,7 +1,8 @@
 """The sensors on the bus: answer each state with its readings."""
 
 import time
-from typing import Any
+from itertools import chain
+from typing import Any, NamedTuple
 
 from phototaxis.bus import Bus
 from phototaxis.chunks import Chunks
@@ -11,13 +12,20 @@ from phototaxis.protocol import Once
 from phototaxis_sensors.suite import SensorSuite
 
 
+class Session(NamedTuple):
+    """The sensors in one run."""
+
+    run: str
+    sense: Once[Readings]
+
+
 class Server:
     """Readings for every state of whatever run is on the bus."""
 
     def __init__(self, bus: Bus):
         self._bus = bus
-        self._run = ""
-        self._once: Once[Readings] | None = None
+        self._session: Session | None = None
+        self._newest = -1
         self._log = Chunks(bus, "log/sensors", self._chunk)
 
     def serve(self) -> None:
@@ -35,30 +43,29 @@ class Server:
                 return
 
     def _answer(self, state: State) -> None:
-        if state.run != self._run and not self._meet(state.run):
-            return
-        assert self._once is not None
-        fresh = state.tick > self._tick
-        readings = self._once(state)
+        session = self._meet(state.run)
+        readings = session.sense(state) if session else None
         if readings is None:
             return
         readings.driver = state.driver  # the seat may change while a tick is asked again
         self._bus.put("readings", readings)
-        if fresh:
-            self._tick = state.tick
-            self._log.add((state.tick, readings.sonar, readings.light), time.monotonic())
+        if state.tick > self._newest:
+            self._newest = state.tick
+            self._log.add((state.run, state.tick, readings.sonar, readings.light), time.monotonic())
 
-    def _meet(self, run: str) -> bool:
-        """Learn the world of a run; False when it is not to be had now (the state will come again)."""
+    def _meet(self, run: str) -> Session | None:
+        """The sensors of a run; None when its world is not to be had now (the state will come again)."""
+        if self._session is not None and self._session.run == run:
+            return self._session
         world = self._bus.ask_one("world", World)
         if world is None or world.run != run:
-            return False
+            return None
         self._log.flush()
-        self._run, self._tick = run, -1
-        self._once = Once(SensorSuite(world))
-        return True
+        self._newest = -1
+        self._session = Session(run, Once(SensorSuite(world)))
+        return self._session
 
     def _chunk(self, seq: int, columns: list[Any]) -> SensorsLog:
-        ticks, sonars, lights = columns
-        flat = [value for row in sonars for value in row]
-        return SensorsLog(self._run, seq, self._bus.ident, ticks, flat, [value for row in lights for value in row])
+        runs, ticks, sonars, lights = columns
+        sonar, light = list(chain.from_iterable(sonars)), list(chain.from_iterable(lights))
+        return SensorsLog(runs[0], seq, self._bus.ident, ticks, sonar, light)

@@ -82,7 +82,7 @@ class Physics:
             body.position, body.angle = (x, y), heading
             body.velocity, body.angular_velocity = (0, 0), 0
             space.reindex_shapes_for_body(body)
-            for _ in range(space.collision_persistence + 1):
+            for _ in range(int(space.collision_persistence) + 1):
                 space.step(self._dt)
         self._front = self._rear = False
         return Motion(pose, 0.0, 0.0, False, False)
@@ -163,7 +163,11 @@ class Physics:
     def _hits(self, shape: pymunk.Poly, pose: Pose) -> bool:
         """Whether a box of the robot's kind would touch a static shape at a pose."""
         transform = pymunk.Transform(
-            math.cos(pose.heading), math.sin(pose.heading), -math.sin(pose.heading), math.cos(pose.heading), *pose[:2]
+            math.cos(pose.heading),
+            math.sin(pose.heading),
+            -math.sin(pose.heading),
+            math.cos(pose.heading),
+            *pose[:2],
         )
         test = pymunk.Poly(pymunk.Body(body_type=pymunk.Body.KINEMATIC), shape.get_vertices(), transform)
         return any(hit.shape is not self._box for hit in self._space.shape_query(test))
@@ -176,4 +180,3 @@ class Physics:
                 self._front = True
             else:
                 self._rear = True
-

@@ -8,7 +8,7 @@ import msgspec
 from phototaxis.bus import Bus, Event
 from phototaxis.chunks import Chunks
 from phototaxis.journal import Journal
-from phototaxis.messages import Command, Control, ControlReply, Phase, SimLog, Status
+from phototaxis.messages import Command, Control, ControlReply, End, Phase, SimLog, Status
 from phototaxis.protocol import Question
 
 from phototaxis_sim.pace import Pace
@@ -26,7 +26,7 @@ class Entry(msgspec.Struct, array_like=True):
     left: float
     right: float
     author: str
-    end: str
+    end: End
 
 
 class Server:
@@ -154,7 +154,7 @@ class Server:
 
     def _advance(self, entry: Entry) -> None:
         self._held = None
-        self._sim.advance(entry.left, entry.right, entry.author, entry.end)  # type: ignore[arg-type]
+        self._sim.advance(entry.left, entry.right, entry.author, entry.end)
         if self._sim.ended is not None:
             self._recent.append(self._sim.ended.end == "reached")
 
@@ -249,7 +249,11 @@ class Server:
 
     def _chunk(self, seq: int, columns: list[Any]) -> SimLog:
         ended, self._ended = self._ended, []
-        return SimLog(self._sim.world.run, seq, self._bus.ident, self._seat.driver, *columns, ended)
+        tick, episode, seconds, x, y, heading, left, right, contact = columns
+        return SimLog(
+            self._sim.world.run, seq, self._bus.ident, self._seat.driver,
+            tick, episode, seconds, x, y, heading, left, right, contact, ended,
+        )  # fmt: skip
 
     def _header(self) -> bytes:
         return msgspec.msgpack.encode(self._sim.snapshot(list(self._recent)))

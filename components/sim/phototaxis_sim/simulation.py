@@ -67,9 +67,7 @@ class Simulation:
         self.ended = None
         self._tick += 1
         if end:
-            self.ended = Episode(
-                self.world.run, self._episode, self._tick - 1, self._steps, end, author, *self._start
-            )
+            self.ended = Episode(self.world.run, self._episode, self._tick - 1, self._steps, end, author, *self._start)
             self.episodes += 1
             self.reached += end == "reached"
             self._episode += 1
@@ -84,7 +82,14 @@ class Simulation:
     def snapshot(self, recent: list[bool]) -> Snapshot:
         """What `restore` needs to begin the present episode again; only at its first tick."""
         return Snapshot(
-            self.world.run, self._tick, self._episode, self._epoch, self.episodes, self.reached, self._before, recent
+            self.world.run,
+            self._tick,
+            self._episode,
+            self._epoch,
+            self.episodes,
+            self.reached,
+            self._before,
+            recent,
         )
 
     def restore(self, at: Snapshot) -> None:

@@ -1,0 +1,37 @@
+# The verbs of this project. Every one sets itself up: a virtual environment in .venv, from pinned versions.
+.DEFAULT_GOAL := help
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# The index of PyTorch's CPU builds; empty: the ordinary index alone (it may bring gigabytes of CUDA).
+TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
+TEST ?= tests
+
+.PHONY: help setup demo test check bench clean
+
+help: ## list the verbs
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' Makefile | column -t -s '|'
+
+setup: $(VENV)/.ready ## make .venv with everything in it
+
+$(VENV)/.ready: pyproject.toml constraints.txt scripts/setup
+	@PYTHON="$(PYTHON)" TORCH_INDEX="$(TORCH_INDEX)" scripts/setup $(VENV)
+	@touch $@
+
+demo: setup ## learn over the bus, watch, evaluate: about ten seconds once set up
+	@$(BIN)/phototaxis demo --seed 7
+
+test: setup ## all tests, with real processes on a real bus
+	@$(BIN)/python -m pytest $(TEST)
+
+check: setup ## style, types
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/pyright
+
+bench: setup ## measure rates and costs on this machine
+	@$(BIN)/python benchmarks/run.py
+
+clean: ## remove .venv and caches; runs/ stays
+	rm -rf $(VENV) .pytest_cache .ruff_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +
