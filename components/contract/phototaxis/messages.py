@@ -241,7 +241,7 @@ M = TypeVar("M", bound=Message)
 
 
 class _Header(Struct):
-    schema: int = 0
+    schema: int = SCHEMA
 
 
 encode = msgspec.msgpack.Encoder().encode

@@ -1,0 +1,21 @@
+"""What all tests share: an arena, a setup."""
+
+import pytest
+from phototaxis.arena import Arena
+from phototaxis.task import TaskOptions
+from phototaxis_agent.exploration import Exploration
+from phototaxis_agent.learners.qtable import Options
+from phototaxis_agent.setup import Setup
+from phototaxis_sim import arenas
+
+
+@pytest.fixture(scope="session")
+def paper() -> Arena:
+    """The paper's arena."""
+    return arenas.load("paper")
+
+
+@pytest.fixture
+def setup() -> Setup:
+    """The default agent: Q-table, simple percept."""
+    return Setup("qtable", Options(), TaskOptions(), Exploration())

@@ -1,0 +1,12 @@
+"""Values that many tests make."""
+
+from phototaxis.messages import Readings
+
+
+def readings(tick: int = 0, light: tuple[float, float] = (0.1, 0.1), **changes) -> Readings:
+    """Readings far from everything, with changes."""
+    fields = {
+        "run": "r", "tick": tick, "episode": 0, "epoch": tick, "sonar": [5.0] * 16, "light": light,
+        "front": False, "rear": False, "left": 0.0, "right": 0.0, "author": "", "driver": "",
+    }  # fmt: skip
+    return Readings(**{**fields, **changes})

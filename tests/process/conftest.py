@@ -1,0 +1,58 @@
+"""Each test has a world of its own: its name on the bus, its folder of sockets, its free ports."""
+
+import secrets
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from support import Process, command
+
+
+@pytest.fixture(autouse=True)
+def sockets(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A private, short folder for Unix sockets."""
+    folder = tempfile.mkdtemp(prefix="pt-")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+    yield
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture
+def world() -> str:
+    """A name that no other test has."""
+    return f"t-{secrets.token_hex(3)}"
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Process]]:
+    """Starts `phototaxis WORDS`; everything started ends with the test."""
+    started: list[Process] = []
+
+    def begin(*words: object, argv: list[str] | None = None) -> Process:
+        process = Process(tmp_path, f"{len(started)}-{words[0]}", *(argv or command(*words)))
+        started.append(process)
+        return process
+
+    yield begin
+    for process in started:
+        if process.popen.poll() is None:
+            process.popen.terminate()
+    for process in started:
+        try:
+            process.end(20)
+        finally:
+            process.kill()
+
+
+@pytest.fixture
+def up(start: Callable[..., Process], world: str, tmp_path: Path) -> Callable[..., Process]:
+    """Starts `phototaxis up` in the test's world, on free ports."""
+
+    def begin(*words: object) -> Process:
+        return start(
+            "up", "--name", world, "--out", tmp_path / "runs", "--grpc-port", 0, "--web-port", -1, "--json", *words
+        )
+
+    return begin

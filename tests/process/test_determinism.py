@@ -1,0 +1,79 @@
+"""Same seeds, same trajectory: in one process, over the bus, and through every accident."""
+
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from support import children, observer, phototaxis, result, wait_status
+
+EPOCHS = 3000
+HASHES = ("state_hash", "learner_hash")
+
+
+@pytest.fixture(scope="session")
+def alone() -> dict[str, str]:
+    """The hashes of the same run in one process."""
+    done = phototaxis("train", "--epochs", EPOCHS, "--seed", 7, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    return {name: found[name] for name in HASHES}
+
+
+def hashes(found: dict[str, str]) -> dict[str, str]:
+    return {name: found[name] for name in HASHES}
+
+
+def test_the_bus_changes_nothing(up, alone):
+    for _ in range(2):
+        found = result(up("--epochs", EPOCHS, "--seed", 7))
+        assert found["finished"]
+        assert found["epochs"] == EPOCHS
+        assert found["episodes"] >= found["reached"] > 0
+        assert found["ticks"] == EPOCHS + found["episodes"]
+        assert Path(found["recording"]).stat().st_size > 100_000
+        assert Path(found["checkpoint"]).exists()
+        assert hashes(found) == alone
+    other = phototaxis("train", "--epochs", EPOCHS, "--seed", 8, "--json")
+    assert hashes(json.loads(other.stdout)) != alone
+
+
+def test_the_rich_percept_too(up):
+    words = ("--epochs", 1500, "--seed", 3, "--percept", "rich", "--arena", "shadows")
+    done = phototaxis("train", *words, "--json")
+    assert hashes(result(up(*words, "--no-recorder"))) == hashes(json.loads(done.stdout))
+
+
+@pytest.mark.parametrize("victims", [["sensors", "recorder"], ["agent"], ["sim"], ["agent", "sim"]])
+def test_killed_components_are_restarted_and_change_nothing(up, alone, world, victims):
+    launcher = up("--epochs", EPOCHS, "--seed", 7)
+    with observer(world) as bus:
+        for number, victim in enumerate(victims):
+            wait_status(bus, lambda status, number=number: status.epoch > 500 * (number + 1), launcher)
+            os.kill(children(launcher.popen.pid)[victim], signal.SIGKILL)
+    found = result(launcher)
+    assert found["restarts"] == dict.fromkeys(victims, 1)
+    assert hashes(found) == alone
+
+
+def test_lost_and_doubled_messages_change_nothing(start, alone, world, tmp_path):
+    checkpoint = tmp_path / "c.npz"
+    share, lossy = "0.02", str(Path(__file__).with_name("lossy.py"))
+
+    def unreliable(role: str, *words: str):
+        return start(role, argv=[sys.executable, lossy, f"phototaxis_{role}", share, "--name", world, *words])
+
+    sim = unreliable("sim", "--epochs", str(EPOCHS), "--seed", "7")
+    sensors = unreliable("sensors")
+    with observer(world) as bus:
+        agent = unreliable("agent", "--checkpoint", str(checkpoint))
+        status = wait_status(bus, lambda status: status.phase == "finished", sim, sensors, agent)
+    agent.stop()
+    assert status.refused["command: another tick"] > 10  # doubled and repeated answers did arrive
+    found = json.loads(phototaxis("evaluate", checkpoint, "--placements", 20, "--json").stdout)
+    assert found["placements"] == 20
+    from phototaxis.checkpoint import load
+
+    assert {"state_hash": status.hash, "learner_hash": load(checkpoint)[0].learner_hash} == alone

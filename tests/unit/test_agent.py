@@ -1,0 +1,152 @@
+"""The agent: equations 1 and 2, exactly-once learning, checkpoints that continue bit for bit."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from making import readings
+from phototaxis.arena import Arena
+from phototaxis.checkpoint import load, save
+from phototaxis.errors import UserError
+from phototaxis.messages import World
+from phototaxis.task import PERCEPTS, TaskOptions
+from phototaxis_agent.agent import Agent
+from phototaxis_agent.exploration import Exploration, draw
+from phototaxis_agent.learner import Transition, find
+from phototaxis_agent.learners.qtable import Options, QTable
+from phototaxis_agent.setup import Setup, from_checkpoint
+from phototaxis_lab.loop import Loop
+
+
+@pytest.mark.parametrize(("percept", "entries"), [("simple", 216), ("rich", 3600)])
+def test_tables_have_the_papers_sizes_and_start(percept, entries):
+    table = QTable(Options(), PERCEPTS[percept], np.random.default_rng(0)).table
+    assert table.size == entries
+    assert -0.15 <= table.min() < -0.14
+    assert 0.14 < table.max() <= 0.15
+
+
+def test_equation_1():
+    learner = QTable(Options(alpha=0.5, gamma=0.9), PERCEPTS["simple"], np.random.default_rng(0))
+    state, following = (0, 0, 0, 0), (2, 1, 1, 1)
+    learner.table[0, 3], learner.table[23] = 1.0, [0, 0, 4, 0, 0, 0, 0, 0, 0]
+    error = learner.learn(Transition(state, 3, 2.0, following, terminated=False))
+    assert error == pytest.approx(2 + 0.9 * 4 - 1)
+    assert learner.table[0, 3] == pytest.approx(1 + 0.5 * error)
+    learner.learn(Transition(state, 3, 3.0, following, terminated=True))
+    assert learner.table[0, 3] == pytest.approx((1 + 0.5 * error) * 0.5 + 1.5)
+
+
+def test_equation_2():
+    values, temperature = [0.1, 0.5, -0.2], 0.3
+    draws = np.array([draw(values, temperature, u) for u in np.random.default_rng(0).random(30_000)])
+    weights = np.exp(np.array(values) / temperature)
+    assert np.bincount(draws) / len(draws) == pytest.approx(weights / weights.sum(), abs=0.01)
+    assert draw([0.0, 1e6], 1e-3, 0.999) == 1
+
+
+def test_temperature_falls_and_stays():
+    exploration = Exploration(hot=1.0, cold=0.01, cooling=0.5)
+    assert exploration.temperature(0, 1000) == 1
+    assert exploration.temperature(250, 1000) == pytest.approx(0.1)
+    assert exploration.temperature(500, 1000) == exploration.temperature(10_000, 1000) == 0.01
+
+
+def test_the_agent_learns_from_the_action_that_was_applied(setup: Setup, paper: Arena):
+    agent = setup.agent(World("r", paper, 0, 0))
+    table = agent.learner.save()["table"]
+    agent(readings(0))
+    before = table.copy()
+    agent(readings(1, left=1.0, right=-1.0, author="someone"))
+    changed = np.argwhere(table != before)
+    assert changed.tolist() == [[16, 5]]  # state (2, 0, 0, 0), action (fwd, rvs)
+    before = table.copy()
+    agent(readings(2, left=0.3, right=0.1, author="someone"))  # none of the nine
+    agent(readings(3, left=0.0, right=0.0, author=""))  # the motors were stopped
+    agent(readings(4, episode=1, left=1.0, right=1.0, author="someone"))  # a new episode
+    assert np.array_equal(table, before)
+    assert agent.epoch == 1
+
+
+def test_episodes_end_at_the_light_and_at_the_cap(paper: Arena):
+    setup = Setup("qtable", Options(), TaskOptions(cap=3), Exploration())
+    agent = setup.agent(World("r", paper, 0, 0))
+    ends = [agent(readings(tick, left=1.0, right=1.0, author="a")).end for tick in range(5)]
+    assert ends == ["", "", "", "cap", "cap"]
+    assert agent(readings(9, episode=1, light=(0.2, 0.96))).end == "reached"
+
+
+def test_a_checkpoint_continues_bit_for_bit(tmp_path: Path, setup: Setup, paper: Arena):
+    whole = Loop(paper, setup.agent(World("r", paper, 3, 2000)), 3, 2000)
+    for tick in range(1700):
+        if tick == 1000:
+            save(tmp_path / "c.npz", *whole.agent.checkpoint())
+        whole.step()
+    half = Loop(paper, whole.agent, 3, 2000)
+    half.agent = setup.agent(World("r", paper, 3, 2000))
+    half.agent.restore(*load(tmp_path / "c.npz"), source="c.npz")
+    replay = Loop(paper, setup.agent(World("r", paper, 3, 2000)), 3, 2000)
+    for tick in range(1700):
+        if tick == 1000:
+            replay.agent = half.agent
+        replay.step()
+    assert replay.simulation.state.hash == whole.simulation.state.hash
+    assert replay.agent.checkpoint()[0] == whole.agent.checkpoint()[0]
+
+
+@pytest.fixture
+def file(tmp_path: Path, setup: Setup, paper: Arena) -> Path:
+    agent = setup.agent(World("r", paper, 0, 10))
+    agent(readings(0))
+    save(tmp_path / "c.npz", *agent.checkpoint())
+    return tmp_path / "c.npz"
+
+
+def test_a_checkpoint_of_another_percept_is_refused(file: Path, paper: Arena):
+    rich = Setup("qtable", Options(), TaskOptions(percept="rich"), Exploration()).agent(World("r", paper, 0, 10))
+    with pytest.raises(UserError, match="of the percept 'simple', but 'rich' is asked for"):
+        rich.restore(*load(file), source=str(file))
+
+
+def test_bad_checkpoints_get_one_line(file: Path, tmp_path: Path):
+    whole = file.read_bytes()
+    flipped = bytearray(whole)
+    flipped[whole.index(b"table.npy") + 200] ^= 1
+    np.savez(tmp_path / "other.npz", x=np.zeros(3))
+    np.savez(tmp_path / "pickled.npz", meta=np.array([{"a": 1}], dtype=object))
+    bad = {
+        "truncated": whole[: len(whole) // 2],
+        "empty": b"",
+        "not ours": b"hello, this is no checkpoint",
+        "flipped": bytes(flipped),
+        "other": (tmp_path / "other.npz").read_bytes(),
+        "pickled": (tmp_path / "pickled.npz").read_bytes(),
+    }
+    for name, data in bad.items():
+        path = tmp_path / f"{name}.npz"
+        path.write_bytes(data)
+        with pytest.raises(UserError, match=str(path)) as error:
+            load(path)
+        assert "\n" not in str(error.value), name
+    with pytest.raises(UserError, match="no such checkpoint"):
+        load(tmp_path / "missing.npz")
+
+
+def test_a_checkpoint_knows_its_setup(file: Path):
+    meta, _ = load(file)
+    assert from_checkpoint(meta, "c") == Setup("qtable", Options(), TaskOptions(), Exploration())
+
+
+def test_an_unknown_learner_lists_those_there_are():
+    with pytest.raises(UserError, match=r"no learner 'magic'; there are: .*qtable"):
+        find("magic")
+
+
+def test_a_frozen_agent_does_not_learn(setup: Setup, paper: Arena):
+    agent: Agent = setup.agent(World("r", paper, 0, 0), learning=False)
+    before = agent.checkpoint()[0].learner_hash
+    for tick in range(20):
+        agent(readings(tick, left=1.0, right=1.0, author="a"))
+    assert agent.checkpoint()[0].learner_hash == before
+    assert math.isclose(agent.last.temperature, agent.exploration.cold)

@@ -1,0 +1,43 @@
+"""Messages: what is valid passes in MessagePack and JSON, all else is refused with a reason."""
+
+import msgspec
+import pytest
+from phototaxis.messages import SCHEMA, Command, Decoder, Refused, encode
+
+GOOD = {"run": "r", "tick": 3, "author": "a", "left": 0.5, "right": -1.0}
+decode = Decoder(Command, 200)
+
+
+def packed(**changes) -> bytes:
+    return msgspec.msgpack.encode({**GOOD, **changes})
+
+
+def test_messagepack_and_json_give_the_same_message():
+    command = Command("r", 3, "a", 0.5, -1.0)
+    assert decode(encode(command)) == command
+    assert decode(msgspec.json.encode(command)) == command
+    assert decode(msgspec.json.encode(GOOD)) == command
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [
+        (packed(left=float("nan")), "invalid"),
+        (packed(left=1.01), "invalid"),
+        (packed(left=float("inf")), "invalid"),
+        (packed(tick=-1), "invalid"),
+        (packed(wheels=3), "invalid"),
+        (packed(schema=SCHEMA + 1), f"schema {SCHEMA + 1}, this side speaks {SCHEMA}"),
+        (msgspec.msgpack.encode({"schema": 9, "something": "else"}), "schema 9"),
+        (packed(author="x" * 300), "oversized"),
+        (packed(author="x" * 65), "invalid"),
+        (b"", "malformed"),
+        (b"\xc1garbage", "malformed"),
+        (b'{"run": "r", "tick"', "malformed"),
+        (b"\x93\x01\x02\x03", "malformed"),
+        (b"\x81" * 150, "malformed"),
+    ],
+)
+def test_what_is_not_a_command_is_refused(payload, reason):
+    with pytest.raises(Refused, match=reason):
+        decode(payload)
