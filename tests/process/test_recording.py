@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from rerun.chunk import RrdReader
 from support import result
@@ -10,7 +11,7 @@ from support import result
 RERUN = str(Path(sys.executable).with_name("rerun"))
 
 
-def series(file: str, entity: str, component: str) -> dict[int, object]:
+def series(file: str, entity: str, component: str) -> dict[int, Any]:
     """tick → value of one component of one entity."""
     found = {}
     for chunk in RrdReader(file).stream():

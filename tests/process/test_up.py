@@ -9,7 +9,8 @@ import sys
 import msgspec
 import psutil
 import pytest
-from phototaxis.messages import SCHEMA, Command, Control
+from phototaxis.messages import Command, Control
+from phototaxis.session import BusOptions, open_session
 from support import children, command, observer, phototaxis, result, wait_status
 
 
@@ -73,26 +74,26 @@ def test_intruders_are_refused_counted_and_harmless(up, world):
     good = {"run": "x", "tick": 0, "author": "intruder", "left": 1.0, "right": 1.0}
     bad = {
         "command: another run": msgspec.msgpack.encode(good),
-        "command: schema 99, this side speaks 1": msgspec.msgpack.encode({**good, "schema": 99}),
+        "command: schema": msgspec.msgpack.encode({**good, "schema": 99}),
         "command: oversized": msgspec.msgpack.encode({**good, "author": "x" * 5000}),
         "command: malformed": b"\xc1 not MessagePack",
         "command: invalid": msgspec.msgpack.encode({**good, "left": float("nan")}),
-        "control: invalid": b"",
     }
-    with observer(world) as bus:
+    with observer(world) as bus, open_session("observer", BusOptions(name=world)) as intruder:
         status = wait_status(bus, lambda status: status.phase == "running" and status.tick > 5, launcher)
-        for payload in list(bad.values())[:-1]:
-            bus._session.put(f"{world}/command", payload)
-        for replies in bus._session.get(f"{world}/control", payload=b'{"verb": "self-destruct"}'):
-            raise AssertionError(f"answered {replies}")
+        for payload in bad.values():
+            intruder.put(f"{world}/command", payload)
+        assert not list(intruder.get(f"{world}/control", payload=b'{"verb": "self-destruct"}', timeout=1))
         stolen = Command(status.run, status.tick, "intruder", 1.0, 1.0)
-        wait_status(bus, lambda status: set(bad) <= set(status.refused), launcher)
-        assert not bus.control(Control("claim", "intruder")).ok
-        bus._session.put(f"{world}/command", msgspec.json.encode(stolen))
+        wait_status(bus, lambda status: {*bad, "control: invalid"} <= set(status.refused), launcher)
+        reply = bus.control(Control("claim", "intruder"))
+        assert reply is not None
+        assert not reply.ok
+        assert "taken" in reply.reason
+        intruder.put(f"{world}/command", msgspec.json.encode(stolen))
         later = wait_status(bus, lambda now: now.tick > status.tick + 5, launcher)
         assert later.driver == status.driver
         assert later.phase == "running"
-    assert SCHEMA == 1
 
 
 @pytest.mark.parametrize(
@@ -157,6 +158,7 @@ def test_a_component_that_keeps_dying_is_given_up_with_its_last_words(tmp_path, 
     child = Child("broken", "broken", [], tmp_path)
     child.start()
     for _ in range(3):
+        assert child.process is not None
         child.process.wait(20)
         assert child.watch()
     child.process.wait(20)

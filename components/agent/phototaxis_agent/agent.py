@@ -1,5 +1,6 @@
 """The action-perception loop around a learner (section 5.1 and figure 7 of the paper)."""
 
+import math
 from typing import Any, NamedTuple
 
 import msgspec
@@ -35,7 +36,7 @@ class Agent:
     task, exploration : what is learned and how actions are drawn.
     near : obstacle threshold of the arena, m.
     seed : of all the agent's randomness.
-    budget : learning steps that the temperature's decay is spread over.
+    budget : learning steps that falling rates and temperatures are spread over.
     learning : False freezes the policy (the temperature is then the final one).
 
     The action that is learned from is the one that the readings say was applied, whoever chose it, so
@@ -70,7 +71,7 @@ class Agent:
         self._near = near
         self._memory = Memory()
         self._strides = _strides(self.percept.sizes)
-        self.visits = np.zeros(int(np.prod(self.percept.sizes)), np.int64)
+        self.visits = [0] * math.prod(self.percept.sizes)
         self._run, self._tick, self._episode, self._steps = "", -1, -1, 0
         self._state: tuple[int, ...] | None = None
         self._brightest = 0.0
@@ -93,7 +94,8 @@ class Agent:
             reward = self._reward(self._brightest, readings, unchanged)
             applied = _INDEX.get((readings.left, readings.right)) if readings.author else None
             if self.learning and applied is not None:
-                error = self.learner.learn(Transition(self._state, applied, reward, state, done))
+                progress = min(self.epoch / self.budget, 1.0)
+                error = self.learner.learn(Transition(self._state, applied, reward, state, done, progress))
                 self.epoch += 1
         self._state, self._brightest = state, max(readings.light)
         temperature = self.exploration.temperature(self.epoch, self.budget) if self.learning else self.exploration.cold
@@ -134,7 +136,7 @@ class Agent:
             state=self._state or (),
             brightest=self._brightest,
             random=_map_numbers(str, self._rng.bit_generator.state),
-            visits=self.visits.tolist(),
+            visits=list(self.visits),
             arena=self.arena,
             learner_hash=digest,
         )
@@ -170,9 +172,9 @@ class Agent:
         self.take_over(meta, arrays, source)
         try:
             self._rng.bit_generator.state = _map_numbers(_number, meta.random)
-            self.visits[:] = meta.visits
         except (KeyError, TypeError, ValueError) as error:
             raise UserError(f"{source}: does not fit the {self.name} learner: {error}") from None
+        self.visits = list(meta.visits)
         self.epoch, self.budget = meta.epoch, max(meta.budget, self.budget)
         self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
         self._memory.lights.extend(meta.lights)
@@ -186,7 +188,7 @@ class Agent:
 
 def _strides(sizes: tuple[int, ...]) -> list[int]:
     """Weights that turn a state into its number."""
-    return [int(np.prod(sizes[i + 1 :])) for i in range(len(sizes))]
+    return [math.prod(sizes[i + 1 :]) for i in range(len(sizes))]
 
 
 def _map_numbers(change: Any, value: Any) -> Any:

@@ -20,6 +20,8 @@ class Transition(NamedTuple):
     following: State
     terminated: bool
     """The light was reached: nothing follows. (An episode cut short is not terminated.)"""
+    progress: float
+    """Share of the budget of learning steps that is used, 0..1: for rates that fall."""
 
 
 class Learner(Protocol):

@@ -88,7 +88,7 @@ class Bus:
         self._inbox.put(("stop", None))
 
     def refuse(self, topic: str, why: str) -> None:
-        """Count a message that is not accepted; the first of each reason is told on stderr."""
+        """Count a message that is not accepted, by the word before the colon; the first is told on stderr."""
         reason = f"{topic}: {why.split(':')[0]}"
         if not self.refused[reason]:
             print(f"{self.role}: refused a message on {topic}: {why}", file=sys.stderr, flush=True)

@@ -32,7 +32,7 @@ class Meta(Struct, forbid_unknown_fields=True, kw_only=True):
     hyperparameters: dict[str, Any]
     exploration: dict[str, Any]
     budget: int
-    """Learning steps that the temperature's decay is spread over."""
+    """Learning steps that falling rates and temperatures are spread over."""
     run: str
     tick: int
     """The last tick that was answered; −1 for none."""

@@ -234,7 +234,7 @@ class LogRequest(Message):
 
 
 class Refused(Exception):
-    """A payload that is not a valid message; the text says why in a few words."""
+    """A payload that is not a valid message: a kind of reason, a colon, and the details."""
 
 
 M = TypeVar("M", bound=Message)
@@ -264,7 +264,7 @@ class Decoder(Generic[M]):
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise Refused(_why(payload, error)) from None
         if message.schema != SCHEMA:
-            raise Refused(f"schema {message.schema}, this side speaks {SCHEMA}")
+            raise Refused(f"schema: theirs is {message.schema}, ours {SCHEMA}")
         return message
 
 
@@ -275,4 +275,4 @@ def _why(payload: bytes, error: Exception) -> str:
         schema = header(payload, type=_Header).schema
     except Exception:
         return f"malformed: {error}"
-    return f"schema {schema}, this side speaks {SCHEMA}" if schema != SCHEMA else f"invalid: {error}"
+    return f"schema: theirs is {schema}, ours {SCHEMA}" if schema != SCHEMA else f"invalid: {error}"

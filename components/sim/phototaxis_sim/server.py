@@ -8,7 +8,7 @@ import msgspec
 from phototaxis.bus import Bus, Event
 from phototaxis.chunks import Chunks
 from phototaxis.journal import Journal
-from phototaxis.messages import Command, Control, ControlReply, End, Phase, SimLog, Status
+from phototaxis.messages import Command, Control, ControlReply, End, Phase, SimLog, State, Status
 from phototaxis.protocol import Question
 
 from phototaxis_sim.pace import Pace
@@ -119,7 +119,7 @@ class Server:
         if command is None or self._finished:
             return
         if self._sim.finished:
-            self._log_state()
+            self._record(self._sim.state)
             self._log.flush()
             self._announce(time.monotonic())  # the last mean rate
             self._finished = True
@@ -143,11 +143,12 @@ class Server:
     def _apply(self, entry: Entry) -> None:
         if self._journal is not None and not entry.end:
             self._journal.append(msgspec.msgpack.encode(entry))
-        self._log_state()
+        before = self._sim.state
         self._advance(entry)
         if self._journal is not None and entry.end:
             self._journal.begin(self._header())
         self._ask()
+        self._record(before)  # while the others compute
         if self._sim.ended is not None:
             self._ended.append(self._sim.ended)
             self._bus.put("episode", self._sim.ended)
@@ -241,8 +242,7 @@ class Server:
             self._mean_rate = (self._sim.state.tick - tick) / max(now - since, 1e-9)
         self._bus.put("status", self._status(now))
 
-    def _log_state(self) -> None:
-        s = self._sim.state
+    def _record(self, s: State) -> None:
         contact = s.front + 2 * s.rear
         row = (s.tick, s.episode, s.time, s.x, s.y, s.heading, s.left, s.right, contact)
         self._log.add(row, time.monotonic())
@@ -270,5 +270,5 @@ class Server:
         journal.begin(frames[0])
         for frame in frames[1:]:
             journal.append(frame)
-            self._log_state()
+            self._record(self._sim.state)
             self._advance(msgspec.msgpack.decode(frame, type=Entry))

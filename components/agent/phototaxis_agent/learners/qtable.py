@@ -13,9 +13,11 @@ from phototaxis_agent.learner import Transition
 class Options(Struct, frozen=True, kw_only=True):
     """Hyperparameters of the table."""
 
-    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.1
-    """learning rate α of equation 1"""
-    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.95
+    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.15
+    """learning rate α of equation 1 at the first epoch; it falls geometrically to `alpha_end`"""
+    alpha_end: Annotated[float, Meta(gt=0, le=1)] = 0.015
+    """learning rate at the end of the budget and after it"""
+    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.7
     """discount factor γ of equation 1"""
 
 
@@ -25,29 +27,32 @@ class QTable:
     Options = Options
 
     def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
-        self._alpha, self._gamma = options.alpha, options.gamma
+        self._options = options
         self._index = {state: i for i, state in enumerate(product(*map(range, percept.sizes)))}
-        self._allowed = np.array(percept.actions)
-        self.table = rng.uniform(-0.15, 0.15, (len(self._index), len(ACTIONS)))  # section 5.1, step 1
+        self._allowed = percept.actions
+        shape = len(self._index), len(ACTIONS)
+        self._table: list[list[float]] = rng.uniform(-0.15, 0.15, shape).tolist()  # section 5.1, step 1
 
     def values(self, state: State) -> list[float]:
-        return self.table[self._index[state], self._allowed].tolist()
+        row = self._table[self._index[state]]
+        return [row[action] for action in self._allowed]
 
     def learn(self, transition: Transition) -> float:
         """Equation 1: Q(s, a) += α [r + γ max Q(s', a') − Q(s, a)]; at the light nothing follows."""
-        state, action, reward, following, terminated = transition
-        target = reward if terminated else reward + self._gamma * max(self.values(following))
-        at = self._index[state], action
-        error = target - float(self.table[at])
-        self.table[at] += self._alpha * error
+        state, action, reward, following, terminated, progress = transition
+        options = self._options
+        target = reward if terminated else reward + options.gamma * max(self.values(following))
+        row = self._table[self._index[state]]
+        error = target - row[action]
+        row[action] += options.alpha * (options.alpha_end / options.alpha) ** progress * error
         return error
 
     def save(self) -> dict[str, np.ndarray]:
-        return {"table": self.table}
+        return {"table": np.array(self._table)}
 
     def load(self, arrays: dict[str, np.ndarray]) -> None:
-        table = arrays.get("table")
-        if table is None or table.shape != self.table.shape or table.dtype != self.table.dtype:
+        table, expected = arrays.get("table"), (len(self._index), len(ACTIONS))
+        if table is None or table.shape != expected or table.dtype != np.float64:
             found = "none" if table is None else f"{table.shape} of {table.dtype}"
-            raise ValueError(f"expected a table of {self.table.shape}, found {found}")
-        self.table = table.copy()
+            raise ValueError(f"expected a table of {expected}, found {found}")
+        self._table = table.tolist()

@@ -1,0 +1,205 @@
+"""`make bench`: rates and costs on this machine, in one run.
+
+Every figure is the median of several rounds that take turns, so that a noisy machine disturbs all alike.
+Compare ratios, not single figures.
+"""
+
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from phototaxis.arena import Arena, Disc
+from phototaxis.messages import Command, Decoder, Message, Readings, State, World, encode
+from phototaxis.task import TaskOptions
+from phototaxis_agent.exploration import Exploration
+from phototaxis_agent.learners.qtable import Options
+from phototaxis_agent.setup import Setup
+from phototaxis_lab.loop import Loop
+from phototaxis_sensors.light import LightModel
+from phototaxis_sensors.scene import Scene
+from phototaxis_sensors.sonar import SonarModel
+from phototaxis_sim import arenas
+from phototaxis_sim.physics import Physics, Pose
+
+ROUNDS = 5
+EPOCHS = 3000
+BUS_EPOCHS = 10_000
+SETUP = Setup("qtable", Options(), TaskOptions(), Exploration())
+
+
+def main() -> None:
+    paper = arenas.load("paper")
+    crowded = with_obstacles(paper, 1000)
+    rounds: list[dict[str, float]] = []
+    for number in range(ROUNDS):
+        print(f"round {number + 1} of {ROUNDS}", file=sys.stderr, flush=True)
+        rounds.append(
+            {
+                "in-process, epochs/s": in_process(paper),
+                "in-process with 1,000 obstacles, epochs/s": in_process(crowded),
+                "bare ring of three processes, ticks/s": ring(),
+                "four processes with recorder, ticks/s": over_the_bus(),
+                "three processes, no recorder, ticks/s": over_the_bus("--no-recorder"),
+            }
+        )
+    rates = {name: statistics.median(one[name] for one in rounds) for name in rounds[0]}
+    print("\nRates (median of", ROUNDS, "rounds, lowest and highest)")
+    for name, rate in rates.items():
+        values = [one[name] for one in rounds]
+        print(f"  {name:45} {rate:9,.0f}   ({min(values):,.0f} to {max(values):,.0f})")
+
+    print("\nRatios (median of the rounds' own ratios)")
+    for name, ratio in ratios(rounds).items():
+        print(f"  {name:60} {ratio:5.2f}")
+
+    print("\nCost of one tick by part, in one process, µs")
+    for name, cost in parts(paper).items():
+        print(f"  {name:60} {cost:7.1f}")
+
+
+def ratios(rounds: list[dict[str, float]]) -> dict[str, float]:
+    """The ratios that matter, each from figures of the same round."""
+
+    def median(ratio: Callable[[dict[str, float]], float]) -> float:
+        return statistics.median(map(ratio, rounds))
+
+    def efficiency(run: str) -> Callable[[dict[str, float]], float]:
+        return lambda r: (1 / r["bare ring of three processes, ticks/s"] + 1 / r["in-process, epochs/s"]) * r[run]
+
+    plain, crowded = "in-process, epochs/s", "in-process with 1,000 obstacles, epochs/s"
+    recorded, bare = "four processes with recorder, ticks/s", "three processes, no recorder, ticks/s"
+    return {
+        "bus efficiency with recorder: (ring + in-process) / measured": median(efficiency(recorded)),
+        "bus efficiency without recorder": median(efficiency(bare)),
+        "rate with recorder / without": median(lambda r: r[recorded] / r[bare]),
+        "slower with 1,000 obstacles": median(lambda r: r[plain] / r[crowded]),
+    }
+
+
+def with_obstacles(arena: Arena, count: int) -> Arena:
+    """The arena with small discs on a grid outside the middle, the same everywhere."""
+    side = int(np.ceil(np.sqrt(count)))
+    discs = []
+    for index in range(count):
+        x, y = (index % side + 0.5) / side, (index // side + 0.5) / side
+        discs.append(Disc((0.2 + 9.6 * x, 0.2 + 9.6 * y), 0.005))
+    return msgspec.structs.replace(arena, discs=discs, placement=msgspec.structs.replace(arena.placement, clearance=0))
+
+
+def in_process(arena: Arena) -> float:
+    """Epochs/s of the loop in one process: physics, 16 sonars, lights, Q-table."""
+    loop = Loop(arena, SETUP.agent(World("bench", arena, 1, EPOCHS)), 1, EPOCHS)
+    began = time.perf_counter()
+    while not loop.simulation.finished:
+        loop.step()
+    return EPOCHS / (time.perf_counter() - began)
+
+
+def ring() -> float:
+    """Ticks/s of the bare ring."""
+    script = str(Path(__file__).with_name("ring.py"))
+    return float(subprocess.run([sys.executable, script, "10000"], capture_output=True, check=True).stdout)
+
+
+def over_the_bus(*words: str) -> float:
+    """Ticks/s of `phototaxis up` in lockstep."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [
+            sys.executable, "-m", "phototaxis_launcher", "up", "--json", "--name=bench", f"--out={folder}",
+            f"--epochs={BUS_EPOCHS}", "--seed=1", "--grpc-port=0", "--web-port=-1", *words,
+        ]  # fmt: skip
+        done = subprocess.run(command, capture_output=True, check=True)
+        return json.loads(done.stdout.splitlines()[-1])["ticks_per_second"]
+
+
+def parts(arena: Arena) -> dict[str, float]:
+    """The cost of each part of one tick, µs."""
+    loop = Loop(arena, SETUP.agent(World("bench", arena, 1, 0)), 1)
+    for _ in range(500):
+        loop.step()
+    state = loop.simulation.state
+    readings = loop.sensors(state)
+    command = loop.agent(readings)
+    physics, scene = Physics(arena), Scene(arena)
+    physics.place(Pose(3, 3, 0))
+    sonar, light = SonarModel(arena, scene), LightModel(arena, scene)
+    pose = state.x, state.y, state.heading
+    costs = {
+        "physics: 5 steps": cost(lambda: physics.drive(0.5, -0.5)),
+        "16 sonars": cost(lambda: sonar(*pose)),
+        "2 light sensors": cost(lambda: light(*pose)),
+        "sensor suite (sonar, light, noise, message)": cost(lambda: loop.sensors(state)),
+        "agent (percept, reward, learning, action, message)": cost(lambda: agent_step(loop, readings)),
+    }
+    messages: list[tuple[Message, Any]] = [(state, State), (readings, Readings), (command, Command)]
+    decoders = [Decoder(kind, 4096) for _, kind in messages]
+    payloads = [encode(message) for message, _ in messages]
+    sizes = ", ".join(f"{kind.__name__} {len(payload)}" for (_, kind), payload in zip(messages, payloads, strict=True))
+    costs[f"encode three messages ({sizes} bytes)"] = cost(lambda: [encode(message) for message, _ in messages])
+    costs["decode and validate three messages"] = cost(
+        lambda: [decode(payload) for decode, payload in zip(decoders, payloads, strict=True)]
+    )
+    costs["recorder: translate, batches of 400 ticks (in its own process)"] = recorder_cost(arena, loop)
+    return costs
+
+
+def agent_step(loop: Loop, readings: Readings) -> None:
+    """One step of the agent on readings that follow its last ones."""
+    readings.tick += 1
+    readings.author, readings.left, readings.right = "a", 1.0, 0.0
+    loop.agent(readings)
+
+
+def recorder_cost(arena: Arena, loop: Loop) -> float:
+    """µs a tick to turn log chunks into Rerun columns on disk."""
+    from phototaxis.messages import AgentLog, SensorsLog, SimLog
+    from phototaxis_recorder.sinks import open_recording
+    from phototaxis_recorder.translate import Translator
+
+    ticks, chunk, began = 8000, 16, 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        recording = open_recording("bench", arena, Path(folder) / "b.rrd", "127.0.0.1", free_port(), "64MiB")
+        translator = Translator(recording, World("bench", arena, 1, 0))
+        began = time.perf_counter()
+        for first in range(0, ticks, chunk):
+            tick, ones = list(range(first, first + chunk)), [1.0] * chunk
+            zeros = [0] * chunk
+            translator.sim(SimLog("b", 0, "w", "d", tick, zeros, ones, ones, ones, ones, ones, ones, zeros, []))
+            translator.sensors(SensorsLog("b", 0, "w", tick, [1.0] * 16 * chunk, [0.1] * 2 * chunk))
+            translator.agent(AgentLog("b", 0, "w", "qtable", "simple", tick, zeros, zeros, ones, ones, ones))
+            if first % 400 == 0:
+                translator.flush()
+        translator.flush()
+        seconds = time.perf_counter() - began
+        recording.disconnect()
+    return seconds / ticks * 1e6
+
+
+def free_port() -> int:
+    import socket
+
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return probe.getsockname()[1]
+
+
+def cost(call: Callable[[], Any], times: int = 2000) -> float:
+    """Median µs of a call, in five batches."""
+    batches = []
+    for _ in range(5):
+        began = time.perf_counter()
+        for _ in range(times):
+            call()
+        batches.append((time.perf_counter() - began) / times * 1e6)
+    return statistics.median(batches)
+
+
+if __name__ == "__main__":
+    main()
