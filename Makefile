@@ -19,7 +19,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt scripts/setup
 	@touch $@
 
 demo: setup ## learn over the bus, watch, evaluate: about ten seconds once set up
-	@$(BIN)/phototaxis demo --seed 7
+	@$(BIN)/phototaxis demo --seed 1
 
 test: setup ## all tests, with real processes on a real bus
 	@$(BIN)/python -m pytest $(TEST)

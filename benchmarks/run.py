@@ -22,7 +22,8 @@ from phototaxis.task import TaskOptions
 from phototaxis_agent.exploration import Exploration
 from phototaxis_agent.learners.qtable import Options
 from phototaxis_agent.setup import Setup
-from phototaxis_lab.loop import Loop
+from phototaxis_lab.loop import Loop, train
+from phototaxis_lab.study import study, summary
 from phototaxis_sensors.light import LightModel
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.sonar import SonarModel
@@ -60,6 +61,10 @@ def main() -> None:
     for name, ratio in ratios(rounds).items():
         print(f"  {name:60} {ratio:5.2f}")
 
+    print("\nLearning: Q-table, simple percept, 3,000 epochs, seeds 0 to 19, 200 fresh placements each")
+    for name, value in summary(list(study(SETUP, paper, 3000, range(20)))).items():
+        print(f"  {name:60} {value:5.3f}")
+
     print("\nCost of one tick by part, in one process, µs")
     for name, cost in parts(paper).items():
         print(f"  {name:60} {cost:7.1f}")
@@ -96,11 +101,7 @@ def with_obstacles(arena: Arena, count: int) -> Arena:
 
 def in_process(arena: Arena) -> float:
     """Epochs/s of the loop in one process: physics, 16 sonars, lights, Q-table."""
-    loop = Loop(arena, SETUP.agent(World("bench", arena, 1, EPOCHS)), 1, EPOCHS)
-    began = time.perf_counter()
-    while not loop.simulation.finished:
-        loop.step()
-    return EPOCHS / (time.perf_counter() - began)
+    return EPOCHS / train(SETUP, arena, 1, EPOCHS)[1]
 
 
 def ring() -> float:

@@ -23,7 +23,7 @@ def series(file: str, entity: str, component: str) -> dict[int, Any]:
 
 
 def test_every_tick_is_in_the_recording(up):
-    found = result(up("--epochs", 1000, "--seed", 5))
+    found = result(up("--epochs", 1500, "--seed", 1))
     file = found["recording"]
     verified = subprocess.run([RERUN, "rrd", "verify", file], capture_output=True, text=True, check=False)
     assert verified.returncode == 0, verified.stderr

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import socket
+import subprocess
 import sys
 
 import msgspec
@@ -11,7 +12,8 @@ import psutil
 import pytest
 from phototaxis.messages import Command, Control
 from phototaxis.session import BusOptions, open_session
-from support import children, command, observer, phototaxis, result, wait_status
+from phototaxis_launcher.cli import VERBS
+from support import children, observer, phototaxis, result, wait_status
 
 
 def test_status_and_control_from_a_second_terminal(up, world):
@@ -161,6 +163,7 @@ def test_a_component_that_keeps_dying_is_given_up_with_its_last_words(tmp_path, 
         assert child.process is not None
         child.process.wait(20)
         assert child.watch()
+    assert child.process is not None
     child.process.wait(20)
     with pytest.raises(ComponentFailed, match=r"broken died 4 times, last with exit code 1(.|\n)*the wheel came off"):
         child.watch()
@@ -168,12 +171,33 @@ def test_a_component_that_keeps_dying_is_given_up_with_its_last_words(tmp_path, 
     assert child.restarts == 3
 
 
-def test_the_base_command_helps_with_everything():
-    for words in ([], ["up", "--help"], ["agent", "--help"], ["evaluate", "--help"]):
-        done = phototaxis(*words)
-        assert done.returncode == 0
-        assert "usage: phototaxis" in done.stdout
+def test_wrong_commands_are_one_line():
     wrong = phototaxis("fly")
     assert wrong.returncode == 2
-    assert "no command 'fly'" in wrong.stderr
-    assert command()[0] == sys.executable
+    assert "no command 'fly'; there are: demo, up, status" in wrong.stderr
+    assert phototaxis().stdout.startswith("usage: phototaxis COMMAND")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_the_base_install_helps_with_every_command(verb):
+    done = without_extras(verb, "--help")
+    assert done.returncode == 0, done.stderr
+    assert f"usage: phototaxis {verb}" in done.stdout
+
+
+@pytest.mark.parametrize(("verb", "package", "extra"), [("sim", "pymunk", "sim"), ("recorder", "rerun", "recorder")])
+def test_a_missing_extra_is_named(verb, package, extra):
+    done = without_extras(verb)
+    assert done.returncode == 2
+    assert f"needs the package {package}; install it with: pip install 'phototaxis[{extra}]'" in done.stderr
+
+
+def without_extras(*words: str) -> subprocess.CompletedProcess[str]:
+    """A command where nothing but the base install can be imported."""
+    script = (
+        "import sys\n"
+        "for name in ('pymunk', 'rerun', 'rerun_cli', 'torch', 'tqdm', 'fmpy'): sys.modules[name] = None\n"
+        "from phototaxis_launcher.cli import main\n"
+        "main()"
+    )
+    return subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, check=False)

@@ -13,11 +13,11 @@ class Exploration(Struct, frozen=True, kw_only=True):
     stays there.
     """
 
-    hot: Annotated[float, Meta(gt=0, le=100)] = 0.3
+    hot: Annotated[float, Meta(gt=0, le=100)] = 0.1
     """temperature T of equation 2 at the first epoch"""
     cold: Annotated[float, Meta(gt=0, le=100)] = 0.05
     """temperature T at the end, and while a policy is evaluated"""
-    cooling: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    cooling: Annotated[float, Meta(gt=0, le=1)] = 0.7
     """share of the epochs after which the temperature has reached `cold`"""
 
     def temperature(self, epoch: int, budget: int) -> float:

@@ -4,6 +4,8 @@ Units are metres, radians and seconds. `(run, tick)` names everything that belon
 increase for the whole life of a run. Encoded, every message is a map that carries `schema`.
 """
 
+import secrets
+from datetime import datetime
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import msgspec
@@ -26,6 +28,11 @@ class Message(Struct, forbid_unknown_fields=True, kw_only=True):
     """What all messages share."""
 
     schema: int = SCHEMA
+
+
+def run_name() -> str:
+    """A fresh name for a run: date, time and four random letters."""
+    return f"{datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
 
 
 class World(Message):

@@ -163,8 +163,8 @@ class TaskOptions(Struct, kw_only=True):
     """what the learner sees: 24 or 400 states"""
     reward: Literal["own", "difference", "static"] = "own"
     """reward scheme; own: the paper's for the percept (simple: difference, rich: static)"""
-    cap: Annotated[int, Meta(ge=1)] = 300
-    """steps after which an episode is given up"""
+    cap: Annotated[int, Meta(ge=1)] = 100
+    """steps after which an episode is given up while learning"""
 
     def scheme(self) -> Reward:
         """The reward function."""

@@ -1,79 +1,15 @@
-"""How good is a frozen policy? Measured on fresh random placements."""
+"""`phototaxis evaluate`: measure the policy in a checkpoint."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
-import numpy as np
 from msgspec import Meta, Struct
-from phototaxis.arena import Arena
 from phototaxis.checkpoint import load
-from phototaxis.messages import Episode, World
+from phototaxis.errors import UserError
+from phototaxis.messages import World
 from phototaxis.options import parse
-from phototaxis.task import REACHED
-from phototaxis_agent.agent import Agent
-from phototaxis_agent.setup import from_checkpoint
-from phototaxis_sim import arenas
-
-from phototaxis_lab.loop import Loop
-
-SEED_OFFSET = 1_000_000_007
-"""Added to an evaluation's seed, so that its placements and noise are none of the training's."""
-
-
-class Evaluation(Struct):
-    """What an evaluation found."""
-
-    placements: int
-    success_rate: float
-    """Share of placements from which the light was reached within the step cap."""
-    steps_mean: float | None
-    """Mean steps of the successful placements; None without any."""
-    path_ratio: float | None
-    """Steps over straight-line steps, mean of the successful placements."""
-    cap: int
-    seed: int
-
-
-def straight_steps(arena: Arena, start: Episode) -> float:
-    """Steps at full speed along the straight line to where the first light reads above 0.95.
-
-    A lower bound that ignores turning and obstacles; at least 1.
-    """
-    motion, robot, law = arena.motion, arena.robot, arena.sensing
-    ahead = max(x for x, _ in robot.light_sensors)
-    nearest = math.inf
-    for light in arena.lights:
-        if law.light_law == "linear":
-            radius = law.light_range * (1 - REACHED / light.brightness)
-        else:
-            radius = math.sqrt(light.brightness / REACHED)
-        nearest = min(nearest, math.dist((start.x, start.y), light.position) - radius - ahead)
-    return max(nearest / (robot.speed * motion.control_period), 1.0)
-
-
-def evaluate(arena: Arena, agent: Agent, placements: int, seed: int) -> Evaluation:
-    """Place the robot `placements` times at random and let the frozen agent drive."""
-    if agent.learning:
-        raise ValueError("an agent that is evaluated must not learn")
-    loop = Loop(arena, agent, seed + SEED_OFFSET)
-    steps, ratios = [], []
-    for _ in range(placements):
-        while (ended := loop.step()) is None:
-            pass
-        if ended.end == "reached":
-            steps.append(ended.steps)
-            ratios.append(ended.steps / straight_steps(arena, ended))
-    return Evaluation(
-        placements=placements,
-        success_rate=len(steps) / placements,
-        steps_mean=float(np.mean(steps)) if steps else None,
-        path_ratio=float(np.mean(ratios)) if ratios else None,
-        cap=agent.task.cap,
-        seed=seed,
-    )
 
 
 class Options(Struct, kw_only=True):
@@ -87,47 +23,28 @@ class Options(Struct, kw_only=True):
     """decides the placements and the policy's draws; never those of a training"""
     arena: str = ""
     """another arena than the one of the training"""
-    cap: Annotated[int, Meta(ge=1)] | None = None
-    """another step cap than the training's"""
+    cap: Annotated[int, Meta(ge=1)] = 300
+    """steps after which a placement counts as failed"""
     json: bool = False
     """print the result as one JSON object"""
-
-
-def from_file(options: Options) -> Evaluation:
-    """Evaluate the policy in a checkpoint.
-
-    Raises
-    ------
-    UserError
-        when the checkpoint or the arena cannot be used.
-    """
-    path = Path(options.checkpoint)
-    meta, arrays = load(path)
-    arena = arenas.load(options.arena or meta.arena)
-    if options.cap is not None:
-        meta.cap = options.cap
-    setup = from_checkpoint(meta, str(path))
-    agent = setup.agent(World("evaluation", arena, options.seed + SEED_OFFSET, 0), learning=False)
-    agent.take_over(meta, arrays, str(path))
-    return evaluate(arena, agent, options.placements, options.seed)
 
 
 def main(argv: Sequence[str]) -> int:
     about = "Freeze the policy of a checkpoint and measure it on fresh random placements."
     options = parse(Options, argv, "phototaxis evaluate", about, positional=["checkpoint"])
-    found = from_file(options)
-    if options.json:
-        print(msgspec.json.encode(found).decode())
-    else:
-        print(describe(found))
+    from phototaxis_agent.setup import from_checkpoint
+    from phototaxis_sim import arenas
+
+    from phototaxis_lab.measure import SEED_OFFSET, describe, evaluate
+
+    path = Path(options.checkpoint)
+    meta, arrays = load(path)
+    if not options.arena and meta.arena not in arenas.shipped():
+        raise UserError(f"{path}: learned in the arena '{meta.arena}', which is not shipped; give its file: --arena")
+    arena = arenas.load(options.arena or meta.arena)
+    setup = from_checkpoint(meta, str(path))
+    agent = setup.agent(World("evaluation", arena, options.seed + SEED_OFFSET, 0), learning=False)
+    agent.take_over(meta, arrays, str(path))
+    found = evaluate(arena, agent, options.placements, options.seed, options.cap)
+    print(msgspec.json.encode(found).decode() if options.json else describe(found))
     return 0
-
-
-def describe(found: Evaluation) -> str:
-    """An evaluation in words."""
-    words = (
-        f"{found.success_rate:.1%} of {found.placements} fresh placements reached the light within {found.cap} steps"
-    )
-    if found.steps_mean is not None:
-        words += f"; {found.steps_mean:.1f} steps on average, {found.path_ratio:.1f} × the straight line"
-    return words

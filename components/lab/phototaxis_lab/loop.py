@@ -1,8 +1,11 @@
 """World, sensors and agent in one process: the step protocol without a bus."""
 
+import time
+
 from phototaxis.arena import Arena
-from phototaxis.messages import Episode
+from phototaxis.messages import Episode, World
 from phototaxis_agent.agent import Agent
+from phototaxis_agent.setup import Setup
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim.simulation import Simulation
 
@@ -24,3 +27,13 @@ class Loop:
     def finish(self) -> None:
         """After the last epoch: the agent also learns from the state that it led to."""
         self.agent(self.sensors(self.simulation.state))
+
+
+def train(setup: Setup, arena: Arena, seed: int, epochs: int) -> tuple[Loop, float]:
+    """Learn for `epochs` steps; the loop as it ended, and the seconds it took."""
+    loop = Loop(arena, setup.agent(World("lab", arena, seed, epochs)), seed, epochs)
+    began = time.perf_counter()
+    while not loop.simulation.finished:
+        loop.step()
+    loop.finish()
+    return loop, time.perf_counter() - began

@@ -2,22 +2,14 @@
 
 import json
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import msgspec
 from msgspec import Meta, Struct
-from phototaxis.arena import Arena
 from phototaxis.checkpoint import save
 from phototaxis.errors import UserError
-from phototaxis.messages import World
-from phototaxis_agent.agent import Agent
-from phototaxis_agent.setup import Setup, parse_setup
-from phototaxis_sim import arenas
-from tqdm import tqdm
-
-from phototaxis_lab.loop import Loop
 
 
 class Options(Struct, kw_only=True):
@@ -27,6 +19,8 @@ class Options(Struct, kw_only=True):
     """name of a shipped arena, or a TOML file"""
     seed: int = 0
     """decides everything: placements, noise, the learner and its exploration"""
+    seeds: Annotated[str, Meta(pattern=r"^([0-9]+:[0-9]+)?$")] = ""
+    """A:B: learn with each seed from A to B − 1 and evaluate each, over all cores"""
     epochs: Annotated[int, Meta(ge=1)] = 3000
     """learning steps"""
     checkpoint: str = ""
@@ -35,36 +29,37 @@ class Options(Struct, kw_only=True):
     """print the result as one JSON object, last on standard output"""
 
 
-def train(setup: Setup, arena: Arena, seed: int, epochs: int, progress: bool = False) -> tuple[Agent, Loop, float]:
-    """Learn for `epochs` steps; the agent, its loop, and the seconds it took."""
-    world = World("lab", arena, seed, epochs)
-    agent = setup.agent(world)
-    loop = Loop(arena, agent, seed, epochs, run=world.run)
-    began = time.perf_counter()
-    with tqdm(total=epochs, unit=" epochs", disable=not progress) as bar:
-        while not loop.simulation.finished:
-            loop.step()
-            bar.update(loop.simulation.state.epoch - bar.n)
-        loop.finish()
-    return agent, loop, time.perf_counter() - began
-
-
 def main(argv: Sequence[str]) -> int:
+    from phototaxis_agent.setup import parse_setup
+
     about = "Learn in one process, without a bus; the same seeds give the same hashes as `phototaxis up`."
     options, setup = parse_setup(Options, argv, "phototaxis train", about)
-    path = Path(options.checkpoint) if options.checkpoint else None
-    if path is not None and not path.parent.is_dir():
-        raise UserError(f"--checkpoint {path}: there is no folder {path.parent}")
+    if options.checkpoint and options.seeds:
+        raise UserError("--checkpoint keeps one learner, --seeds makes many; give one of the two")
+    if options.checkpoint and not Path(options.checkpoint).parent.is_dir():
+        raise UserError(f"--checkpoint {options.checkpoint}: there is no folder {Path(options.checkpoint).parent}")
+    from phototaxis_sim import arenas
+
     arena = arenas.load(options.arena)
-    agent, loop, seconds = train(setup, arena, options.seed, options.epochs, progress=sys.stderr.isatty())
-    meta, arrays = agent.checkpoint()
-    if path is not None:
-        save(path, meta, arrays)
+    found = many(options, setup, arena) if options.seeds else one(options, setup, arena)
+    if options.json:
+        print(json.dumps(found))
+    return 0
+
+
+def one(options: Options, setup: Any, arena: Any) -> dict[str, Any]:
+    """One seed: hashes, rate and, if wanted, the checkpoint."""
+    from phototaxis_lab.loop import train
+
+    loop, seconds = train(setup, arena, options.seed, options.epochs)
+    meta, arrays = loop.agent.checkpoint()
+    if options.checkpoint:
+        save(Path(options.checkpoint), meta, arrays)
     simulation = loop.simulation
-    result = {
+    found = {
         "arena": options.arena,
         "seed": options.seed,
-        "learner": agent.name,
+        "learner": meta.learner,
         "epochs": simulation.state.epoch,
         "episodes": simulation.episodes,
         "reached": simulation.reached,
@@ -72,13 +67,34 @@ def main(argv: Sequence[str]) -> int:
         "ticks_per_second": round(simulation.state.tick / seconds, 1),
         "state_hash": simulation.state.hash,
         "learner_hash": meta.learner_hash,
-        "checkpoint": str(path) if path else None,
+        "checkpoint": options.checkpoint or None,
     }
-    if options.json:
-        print(json.dumps(result))
-    else:
+    if not options.json:
         print(
-            f"{result['epochs']} epochs, {result['episodes']} episodes, {result['reached']} of them reached the light; "
-            f"{result['ticks_per_second']} ticks/s; state {result['state_hash']}, learner {result['learner_hash']}"
+            f"{found['epochs']} epochs, {found['episodes']} episodes, {found['reached']} of them reached the light; "
+            f"{found['ticks_per_second']} ticks/s; state {found['state_hash']}, learner {found['learner_hash']}"
         )
-    return 0
+    return found
+
+
+def many(options: Options, setup: Any, arena: Any) -> dict[str, Any]:
+    """Many seeds: the success of each, median and worst."""
+    from tqdm import tqdm
+
+    from phototaxis_lab.study import study, summary
+
+    first, _, last = options.seeds.partition(":")
+    seeds = range(int(first), int(last))
+    if not seeds:
+        raise UserError(f"--seeds {options.seeds}: no seed from {first} to {last}")
+    progress = tqdm(study(setup, arena, options.epochs, seeds), total=len(seeds), disable=not sys.stderr.isatty())
+    outcomes = list(progress)
+    found = {"epochs": options.epochs, "seeds": msgspec.to_builtins(outcomes), **summary(outcomes)}
+    if not options.json:
+        for outcome in outcomes:
+            print(f"seed {outcome.seed:4}  {outcome.success_rate:6.1%} of 200 fresh placements")
+        print(
+            f"median {found['median']:.1%}, worst {found['min']:.1%}, "
+            f"{found['at_least_80_percent']:.0%} of the seeds at 80% or better"
+        )
+    return found

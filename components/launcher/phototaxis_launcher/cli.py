@@ -51,16 +51,13 @@ def dispatch(words: list[str]) -> int:
     verb = VERBS.get(words[0])
     if verb is None:
         raise UserError(f"no command '{words[0]}'; there are: {', '.join(VERBS)}")
-    return _load(words[0], verb)(words[1:]) or 0
-
-
-def _load(name: str, verb: Verb) -> Callable[[list[str]], int | None]:
     module, _, function = verb.target.partition(":")
     try:
-        return getattr(import_module(module), function)
+        command: Callable[[list[str]], int | None] = getattr(import_module(module), function)
+        return command(words[1:]) or 0
     except ModuleNotFoundError as error:
         raise UserError(
-            f"'phototaxis {name}' needs the package {error.name}; "
+            f"'phototaxis {words[0]}' needs the package {error.name}; "
             f"install it with: pip install 'phototaxis[{verb.extra}]'"
         ) from None
 

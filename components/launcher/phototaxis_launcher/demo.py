@@ -32,6 +32,8 @@ def main(argv: Sequence[str]) -> int:
 The policy, frozen, reached the light from {found["success_rate"]:.1%} of {placements} fresh random placements
 within {found["cap"]} steps. The paper reports "upwards of 80%" for this system (section 6.2).
 
+  (Outcomes differ by seed: `phototaxis train --seeds 0:20` shows twenty of them.)
+
   watched at  {run.url or "(no viewer)"}
   recording   {result["recording"]}
               look again: {Path(sys.executable).parent / "rerun"} {result["recording"]}

@@ -4,7 +4,6 @@ import sys
 import time
 
 from phototaxis.messages import Status
-from tqdm import tqdm
 
 LINE_EVERY = 2.0
 
@@ -13,6 +12,8 @@ class Progress:
     """Shows statuses as they come."""
 
     def __init__(self, epochs: int):
+        from tqdm import tqdm
+
         self._said = 0.0
         self._bar = tqdm(total=epochs or None, unit=" epochs", dynamic_ncols=True) if sys.stderr.isatty() else None
 
@@ -34,7 +35,10 @@ class Progress:
 
     def say(self, text: str) -> None:
         """One line of news."""
-        tqdm.write(text, file=sys.stderr)
+        if self._bar is not None:
+            self._bar.write(text, file=sys.stderr)
+        else:
+            print(text, file=sys.stderr, flush=True)
 
     def close(self) -> None:
         if self._bar is not None:

@@ -1,13 +1,11 @@
 """`phototaxis up`: the processes of a run, brought up, watched and ended together."""
 
 import json
-import secrets
 import signal
 import socket
 import sys
 import time
 from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +13,7 @@ from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
 from phototaxis.errors import ComponentFailed, UserError
-from phototaxis.messages import Status
+from phototaxis.messages import Status, run_name
 from phototaxis.options import Parser, add_options, convert, flags
 from phototaxis.session import BusOptions, open_session
 
@@ -57,7 +55,7 @@ class Run:
 
     def __init__(self, options: UpOptions, agent_words: list[str]):
         self._options = options
-        self.name = f"{datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
+        self.name = run_name()
         self.folder = Path(options.out).resolve() / self.name
         try:
             self.folder.mkdir(parents=True)
@@ -66,6 +64,7 @@ class Run:
         self.checkpoint = self.folder / "checkpoint.npz"
         self.recording = self.folder / "recording.rrd"
         self.url = ""
+        self._alive: list[str] = []
         bus = _bus_flags(options)
         common = [f"--run={self.name}", f"--arena={options.arena}", f"--seed={options.seed}"]
         self.children = {
@@ -113,6 +112,7 @@ class Run:
                     if event is not None and event.topic == "status" and event.message.run == self.name:
                         status = event.message
                         progress.show(status)
+                        self._report(status, progress)
                     if self.children["agent"].process is None:
                         self._start_agent(status, deadline, progress)
             finally:
@@ -125,12 +125,20 @@ class Run:
             if child.watch():
                 progress.say(f"{child.role} died and was restarted; see {self.folder}")
 
+    def _report(self, status: Status, progress: Progress) -> None:
+        """Say who is alive, when that changes."""
+        alive = [who.split("/")[1] for who in status.alive if not who.startswith("observer/")]
+        if alive != self._alive:
+            self._alive = alive
+            progress.say(f"alive: {', '.join(alive)}")
+
     def _start_agent(self, status: Status, deadline: float, progress: Progress) -> None:
         present = {who.split("/")[0] for who in status.alive}
         missing = self.children.keys() - present - {"agent"}
         if not missing:
             self.children["agent"].start()
-            progress.say(f"watch at {self.url}" if self.url else "all components are up")
+            if self.url:
+                progress.say(f"watch at {self.url}")
         elif time.monotonic() > deadline:
             who = ", ".join(sorted(missing))
             raise ComponentFailed(f"{who} did not come up within {STARTING:g} s; see {self.folder}")

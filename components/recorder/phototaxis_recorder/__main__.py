@@ -5,17 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-import rerun as rr
 from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse
-
-from phototaxis_recorder.server import Server
-from phototaxis_recorder.sinks import Page, fresh_file, live_url, open_recording, probe
-from phototaxis_recorder.translate import Translator
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -35,6 +30,12 @@ class Options(ComponentOptions, kw_only=True):
 
 def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis recorder", "Record the run on the bus, live and on disk.")
+    import rerun as rr
+
+    from phototaxis_recorder.server import Server
+    from phototaxis_recorder.sinks import Page, fresh_file, live_url, open_recording, probe
+    from phototaxis_recorder.translate import Translator
+
     output = Path(options.output)
     if not output.parent.is_dir():
         raise UserError(f"--output {output}: there is no folder {output.parent}")

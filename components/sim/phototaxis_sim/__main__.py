@@ -1,7 +1,5 @@
 """`phototaxis sim`: the simulation as a process."""
 
-import datetime
-import secrets
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -10,12 +8,8 @@ from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.journal import Journal
+from phototaxis.messages import run_name
 from phototaxis.options import parse
-
-from phototaxis_sim import arenas
-from phototaxis_sim.pace import Pace
-from phototaxis_sim.server import Server
-from phototaxis_sim.simulation import Simulation
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -29,19 +23,19 @@ class Options(ComponentOptions, kw_only=True):
     """learning steps after which the run is finished; 0: run until stopped"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """simulated seconds per second; 0: lockstep, as fast as the answers come"""
-    run: str = ""
+    run: Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
     """name of the run (default: date, time and a few random letters)"""
     journal: str = ""
     """file that lets a killed simulation continue its run"""
 
 
-def run_name() -> str:
-    """A fresh name for a run."""
-    return f"{datetime.datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
-
-
 def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis sim", "Run the world: physics, time and the seat.")
+    from phototaxis_sim import arenas
+    from phototaxis_sim.pace import Pace
+    from phototaxis_sim.server import Server
+    from phototaxis_sim.simulation import Simulation
+
     arena = arenas.load(options.arena)
     simulation = Simulation(arena, options.seed, options.run or run_name(), options.epochs)
     journal = Journal(Path(options.journal)) if options.journal else None

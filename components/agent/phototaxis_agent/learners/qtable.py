@@ -13,11 +13,11 @@ from phototaxis_agent.learner import Transition
 class Options(Struct, frozen=True, kw_only=True):
     """Hyperparameters of the table."""
 
-    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.15
+    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.16
     """learning rate α of equation 1 at the first epoch; it falls geometrically to `alpha_end`"""
-    alpha_end: Annotated[float, Meta(gt=0, le=1)] = 0.015
+    alpha_end: Annotated[float, Meta(gt=0, le=1)] = 0.01
     """learning rate at the end of the budget and after it"""
-    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.7
+    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.75
     """discount factor γ of equation 1"""
 
 

@@ -1,0 +1,101 @@
+"""The same run through a router, from flags and from ZENOH_CONFIG; no door is left open unasked."""
+
+import json
+import socket
+
+import pytest
+import zenoh
+from phototaxis.checkpoint import load
+from phototaxis.errors import UserError
+from phototaxis.session import BusOptions, open_session, refuse_open_door
+from support import phototaxis, wait_status
+
+
+@pytest.fixture
+def router():
+    """A Zenoh router on a free loopback port; yields its endpoint."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    config = zenoh.Config.from_json5(
+        json.dumps(
+            {
+                "mode": "router",
+                "listen": {"endpoints": [endpoint]},
+                "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+            }
+        )
+    )
+    with zenoh.open(config):
+        yield endpoint
+
+
+@pytest.mark.parametrize("way", ["flags", "variable"])
+def test_components_are_clients_of_a_router(start, world, router, way, tmp_path, monkeypatch):
+    if way == "variable":
+        file = tmp_path / "zenoh.json5"
+        file.write_text(json.dumps({"mode": "client", "connect": {"endpoints": [router]}}))
+        monkeypatch.setenv("ZENOH_CONFIG", str(file))
+        place = ["--name", world]
+    else:
+        place = ["--name", world, "--connect", router]
+    sim = start("sim", *place, "--epochs", 500, "--seed", 2)
+    sensors = start("sensors", *place)
+    agent = start("agent", *place, "--checkpoint", tmp_path / "c.npz")
+    options = BusOptions(name=world, connect=[router])
+    from phototaxis.bus import Bus
+
+    with open_session("observer", options) as session, Bus(session, world, "observer", "test") as bus:
+        status = wait_status(bus, lambda status: status.phase == "finished", sim, sensors, agent)
+    assert agent.stop() == sensors.stop() == sim.stop() == 0
+    alone = json.loads(phototaxis("train", "--epochs", 500, "--seed", 2, "--json").stdout)
+    assert status.hash == alone["state_hash"]
+    assert load(tmp_path / "c.npz")[0].learner_hash == alone["learner_hash"]
+
+
+def test_a_missing_router_is_one_line(start, world):
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    process = start("sensors", "--name", world, "--connect", f"tcp/127.0.0.1:{port}")
+    assert process.end() == 3
+    assert process.stderr.startswith("phototaxis: error: the bus cannot be opened")
+    assert process.stderr.count("\n") == 1
+
+
+def test_without_a_simulation_status_says_so(world):
+    done = phototaxis("status", "--name", world)
+    assert done.returncode == 3
+    assert f"no simulation in the world '{world}'; start one with: phototaxis up" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "open_door"),
+    [
+        ("tcp/127.0.0.1:7447", False),
+        ("tcp/[::1]:7447", False),
+        ("tls/localhost:7447", False),
+        ("unixsock-stream//run/x/sim", False),
+        ("tcp/0.0.0.0:7447", True),
+        ("tcp/[::]:7447", True),
+        ("udp/192.168.1.5:7447", True),
+        ("tcp/robot.example:7447", True),
+    ],
+)
+def test_listening_beyond_this_machine_needs_to_be_asked_for(endpoint, open_door):
+    if open_door:
+        with pytest.raises(UserError, match="--insecure"):
+            refuse_open_door(endpoint)
+    else:
+        refuse_open_door(endpoint)
+
+
+def test_an_open_door_in_a_configuration_file_is_refused(world, tmp_path):
+    file = tmp_path / "zenoh.json5"
+    file.write_text('{mode: "peer", listen: {endpoints: ["tcp/0.0.0.0:0"]}}')
+    done = phototaxis("sim", "--name", world, "--zenoh-config", file)
+    assert done.returncode == 2
+    assert "listens beyond this machine" in done.stderr
+    broken = tmp_path / "broken.json5"
+    broken.write_text("{mode: ")
+    done = phototaxis("sim", "--name", world, "--zenoh-config", broken)
+    assert done.returncode == 2
+    assert f"{broken}: not a Zenoh configuration" in done.stderr
