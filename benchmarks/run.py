@@ -167,8 +167,9 @@ def recorder_cost(arena: Arena, loop: Loop) -> float:
 
     ticks, chunk, began = 8000, 16, 0.0
     with tempfile.TemporaryDirectory() as folder:
-        recording = open_recording("bench", arena, Path(folder) / "b.rrd", "127.0.0.1", free_port(), "64MiB")
-        translator = Translator(recording, World("bench", arena, 1, 0))
+        world = World("bench", arena, 1, 0)
+        recording = open_recording(world, Path(folder) / "b.rrd", "127.0.0.1", free_port(), "64MiB")
+        translator = Translator(recording, world)
         began = time.perf_counter()
         for first in range(0, ticks, chunk):
             tick, ones = list(range(first, first + chunk)), [1.0] * chunk

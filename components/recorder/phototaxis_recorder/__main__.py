@@ -45,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     def start(world: World) -> Translator:
         file = fresh_file(output)
-        recording.append(open_recording(world.run, world.arena, file, options.bind, grpc_port, options.memory))
+        recording.append(open_recording(world, file, options.bind, grpc_port, options.memory))
         return Translator(recording[0], world)
 
     def finish() -> None:

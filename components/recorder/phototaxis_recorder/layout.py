@@ -10,7 +10,7 @@ PLOTS = 600
 """Ticks that the fast plots look back."""
 
 
-def blueprint(arena: Arena) -> rrb.Blueprint:
+def blueprint(arena: Arena, epochs: int) -> rrb.Blueprint:
     """Arena and episode log on the left; success, reward, light and temperature; what was learned."""
     width, height = arena.size
     edge = 0.04 * max(width, height)
@@ -24,6 +24,10 @@ def blueprint(arena: Arena) -> rrb.Blueprint:
         start=rrb.TimeRangeBoundary.cursor_relative(seq=-PLOTS),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
+    whole = None
+    if epochs:
+        ends = (rrb.TimeRangeBoundary.absolute(seq=tick) for tick in (0, round(1.05 * epochs)))
+        whole = rrb.TimeAxis(view_range=rrb.TimeRange(*ends))
     world = rrb.Spatial2DView(
         origin="/",
         contents=["/world/**"],
@@ -39,11 +43,12 @@ def blueprint(arena: Arena) -> rrb.Blueprint:
                 rrb.TimeSeriesView(
                     origin="/plots/success",
                     name="Success, last 50 episodes",
+                    axis_x=whole,
                     axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
                 ),
                 rrb.TimeSeriesView(origin="/plots/reward", name="Reward", time_ranges=recent),
                 rrb.TimeSeriesView(origin="/plots/light", name="Light, left and right", time_ranges=recent),
-                rrb.TimeSeriesView(origin="/plots/temperature", name="Temperature"),
+                rrb.TimeSeriesView(origin="/plots/temperature", name="Temperature", axis_x=whole),
             ),
             rrb.Vertical(
                 rrb.TensorView(origin="/learner/table", name="Q(state, action)", view_fit="fill"),

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import rerun as rr
 import rerun_cli
-from phototaxis.arena import Arena
 from phototaxis.errors import Unavailable
+from phototaxis.messages import World
 
 from phototaxis_recorder.layout import blueprint
 
@@ -29,13 +29,13 @@ def probe(host: str, port: int, flag: str) -> int:
         ) from None
 
 
-def open_recording(run: str, arena: Arena, file: Path, host: str, grpc_port: int, memory: str) -> rr.RecordingStream:
+def open_recording(world: World, file: Path, host: str, grpc_port: int, memory: str) -> rr.RecordingStream:
     """A recording that goes to a file and to a live server at the same time."""
-    recording = rr.RecordingStream("phototaxis", recording_id=f"{run}-{file.stem}")
-    rr.set_log_time_enabled(False)
+    recording = rr.RecordingStream("phototaxis", recording_id=f"{world.run}-{file.stem}")
+    rr.set_log_time_enabled(False, recording=recording)
     server = rr.GrpcServerSink(host, grpc_port, server_memory_limit=memory)
-    recording.set_sinks(server, rr.FileSink(str(file)), default_blueprint=blueprint(arena))
-    recording.send_recording_name(f"{arena.name}, {run}")
+    recording.set_sinks(server, rr.FileSink(str(file)), default_blueprint=blueprint(world.arena, world.epochs))
+    recording.send_recording_name(f"{world.arena.name}, {world.run}")
     return recording
 
 
