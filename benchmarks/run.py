@@ -5,6 +5,7 @@ Compare ratios, not single figures.
 """
 
 import json
+import math
 import statistics
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from phototaxis.arena import Arena, Disc
+from phototaxis.arena import Arena, Disc, Light
 from phototaxis.messages import Command, Decoder, Message, Readings, State, World, encode
 from phototaxis.task import TaskOptions
 from phototaxis_agent.exploration import Exploration
@@ -90,13 +91,14 @@ def ratios(rounds: list[dict[str, float]]) -> dict[str, float]:
 
 
 def with_obstacles(arena: Arena, count: int) -> Arena:
-    """The arena with small discs on a grid outside the middle, the same everywhere."""
-    side = int(np.ceil(np.sqrt(count)))
-    discs = []
-    for index in range(count):
-        x, y = (index % side + 0.5) / side, (index // side + 0.5) / side
-        discs.append(Disc((0.2 + 9.6 * x, 0.2 + 9.6 * y), 0.005))
-    return msgspec.structs.replace(arena, discs=discs, placement=msgspec.structs.replace(arena.placement, clearance=0))
+    """A hall of 60 × 60 m with round pillars at random places, the light in its middle."""
+    rng = np.random.default_rng(0)
+    pillars: list[Disc] = []
+    while len(pillars) < count:
+        x, y = rng.uniform(0, 60, 2).tolist()
+        if math.hypot(x - 30, y - 30) > 2:
+            pillars.append(Disc((x, y), 0.2))
+    return msgspec.structs.replace(arena, size=(60.0, 60.0), lights=[Light((30.0, 30.0))], discs=pillars)
 
 
 def in_process(arena: Arena) -> float:
@@ -138,6 +140,7 @@ def parts(arena: Arena) -> dict[str, float]:
         "16 sonars": cost(lambda: sonar(*pose)),
         "2 light sensors": cost(lambda: light(*pose)),
         "sensor suite (sonar, light, noise, message)": cost(lambda: loop.sensors(state)),
+        "the same while three processes take turns on pipes": taking_turns(),
         "agent (percept, reward, learning, action, message)": cost(lambda: agent_step(loop, readings)),
     }
     messages: list[tuple[Message, Any]] = [(state, State), (readings, Readings), (command, Command)]
@@ -155,8 +158,15 @@ def parts(arena: Arena) -> dict[str, float]:
 def agent_step(loop: Loop, readings: Readings) -> None:
     """One step of the agent on readings that follow its last ones."""
     readings.tick += 1
+    readings.episode = readings.tick // 50
     readings.author, readings.left, readings.right = "a", 1.0, 0.0
     loop.agent(readings)
+
+
+def taking_turns() -> float:
+    """µs of the sensor suite when two other processes run it in between: what cold caches cost."""
+    command = [sys.executable, str(Path(__file__).with_name("turns.py"))]
+    return float(subprocess.run(command, capture_output=True, check=True).stdout)
 
 
 def recorder_cost(arena: Arena, loop: Loop) -> float:

@@ -1,12 +1,16 @@
 """The recording holds every tick, verifies, and shows what it should."""
 
+import os
+import signal
+import socket
 import subprocess
 import sys
+import urllib.request
 from pathlib import Path
 from typing import Any
 
 from rerun.chunk import RrdReader
-from support import result
+from support import children, observer, result, wait, wait_status
 
 RERUN = str(Path(sys.executable).with_name("rerun"))
 
@@ -45,3 +49,29 @@ def test_every_tick_is_in_the_recording(up):
     assert sum("reached the light" in text[0] for text in words.values()) == found["reached"]
     tables = series(file, "/learner/table", "Tensor:data")
     assert tables
+
+
+def test_the_viewers_page_lives_and_dies_with_the_recorder(start, world, tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    words = ("up", "--name", world, "--out", tmp_path, "--epochs", 0, "--speed", 20, "--json")
+    launcher = start(*words, "--grpc-port", 0, "--web-port", port)
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.tick > 5, launcher)
+        assert f"http://localhost:{port}/?url=rerun%2Bhttp" in launcher.stderr
+        page = urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=10)
+        assert b"rerun" in page.read().lower()
+        os.kill(children(launcher.popen.pid)["recorder"], signal.SIGKILL)
+        back = wait_status(bus, lambda status: not any("recorder" in who for who in status.alive), launcher)
+        wait_status(
+            bus,
+            lambda status: status.tick > back.tick and any("recorder" in who for who in status.alive),
+            launcher,
+        )
+        launcher.popen.send_signal(signal.SIGINT)
+        wait(bus, lambda event: event.topic == "gone" and event.message[0] == "sim")
+    found = result(launcher)
+    assert found["restarts"] == {"recorder": 1}
+    assert Path(found["recording"]).name == "recording-2.rrd"
+    with socket.create_server(("127.0.0.1", port)):  # the page is gone, its port is free
+        pass

@@ -4,7 +4,8 @@ import ast
 from pathlib import Path
 
 import pytest
-from phototaxis.topics import ROLES, TOPICS
+from phototaxis.topics import ROLES, TOPICS, table
+from phototaxis_launcher.cli import VERBS
 
 ROOT = Path(__file__).parents[2]
 COMPONENTS = {folder.name: folder for folder in (ROOT / "components").iterdir() if folder.is_dir()}
@@ -52,3 +53,13 @@ def test_every_reader_is_linked_to_the_writer_it_reads():
 
 def test_the_recorder_stays_off_the_tick_path():
     assert {TOPICS[name].kind for name in ROLES["recorder"].reads} == {"log"}
+
+
+def test_the_documented_topics_are_the_real_ones():
+    assert table() in (ROOT / "ARCHITECTURE.md").read_text()
+
+
+def test_the_readme_names_every_command():
+    readme = (ROOT / "README.md").read_text()
+    for verb in VERBS:
+        assert f"phototaxis {verb}" in readme, verb

@@ -64,3 +64,12 @@ ROLES = {
 def alive_key(prefix: str, role: str, ident: str) -> str:
     """The key of a component's liveliness token."""
     return f"{prefix}/alive/{role}/{ident}"
+
+
+def table() -> str:
+    """The topics as a Markdown table, for the documentation."""
+    rows = [
+        f"| `{{name}}/{topic.name}` | {topic.message.__name__} | {topic.writer} | {topic.kind} | {topic.about} |"
+        for topic in TOPICS.values()
+    ]
+    return "\n".join(["| key | message | writer | kind | what |", "|---|---|---|---|---|", *rows])

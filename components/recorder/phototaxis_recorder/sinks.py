@@ -49,21 +49,25 @@ def fresh_file(wanted: Path) -> Path:
 
 
 class Page:
-    """The web viewer's page, served by Rerun's own program on one address."""
+    """The web viewer's page, served by Rerun's own program on one address.
+
+    A shell holds the program by its standard input, so that it ends even when this process is killed.
+    """
 
     def __init__(self, host: str, port: int, grpc_port: int):
         program = Path(rerun_cli.__file__).parent / "rerun"
         source = f"rerun+http://localhost:{grpc_port}/proxy"
+        serve = [program, "--serve-web", "--bind", host, "--web-viewer-port", str(port), source]
         self._process = subprocess.Popen(
-            [program, "--serve-web", "--bind", host, "--web-viewer-port", str(port), source],
-            stdin=subprocess.DEVNULL,
+            ["/bin/sh", "-c", '"$@" & cat >/dev/null; kill $!', "page", *serve],
+            stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
 
     def close(self) -> None:
-        self._process.terminate()
-        self._process.wait()
+        """End the program."""
+        self._process.communicate()
 
 
 def live_url(web_port: int, grpc_port: int) -> str:
