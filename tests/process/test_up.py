@@ -16,7 +16,7 @@ from phototaxis_launcher.cli import VERBS
 from support import children, observer, phototaxis, result, wait_status
 
 
-def test_status_and_control_from_a_second_terminal(up, world):
+def test_status_and_control_from_a_second_terminal(up, world, tmp_path):
     launcher = up("--epochs", 0, "--no-recorder")
     with observer(world) as bus:
         wait_status(bus, lambda status: status.tick > 10, launcher)
@@ -39,7 +39,7 @@ def test_status_and_control_from_a_second_terminal(up, world):
         assert phototaxis("control", "resume", "--name", world).returncode == 0
         wait_status(bus, lambda status: status.speed == 10 and 0 < status.rate < 40, launcher)
         assert "paused simulation" in phototaxis("control", "step", "--name", world).stderr
-        again = phototaxis("up", "--name", world, "--no-recorder")
+        again = phototaxis("up", "--name", world, "--no-recorder", "--out", tmp_path)
         assert again.returncode == 3
         assert f"already running in the world '{world}'" in again.stderr
     launcher.popen.send_signal(signal.SIGINT)

@@ -59,7 +59,7 @@ class Page:
         source = f"rerun+http://localhost:{grpc_port}/proxy"
         serve = [program, "--serve-web", "--bind", host, "--web-viewer-port", str(port), source]
         self._process = subprocess.Popen(
-            ["/bin/sh", "-c", '"$@" & cat >/dev/null; kill $!', "page", *serve],
+            ["/bin/sh", "-c", '"$@" & cat >/dev/null; kill $!; wait', "page", *serve],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
