@@ -8,7 +8,9 @@ from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
+from phototaxis.messages import World
 
+from phototaxis_agent.agent import Agent
 from phototaxis_agent.server import Server
 from phototaxis_agent.setup import parse_setup
 
@@ -31,8 +33,10 @@ def main(argv: Sequence[str] | None = None) -> None:
         raise UserError(f"--checkpoint {path}: there is no folder {path.parent}")
     resume = Path(options.resume) if options.resume else path if options.restarted else None
 
+    def make(world: World) -> Agent:
+        return setup.agent(world, seed=options.agent_seed)
+
     def serve(bus: Bus) -> None:
-        make = lambda world: setup.agent(world, seed=options.agent_seed)  # noqa: E731
         Server(bus, make, path, resume, required=bool(options.resume)).serve()
 
     run("agent", options, serve, label=setup.learner)

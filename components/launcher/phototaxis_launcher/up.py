@@ -16,6 +16,7 @@ from phototaxis.errors import ComponentFailed, UserError
 from phototaxis.messages import Status, run_name
 from phototaxis.options import Parser, add_options, convert, flags
 from phototaxis.session import BusOptions, open_session
+from phototaxis.viewer import viewer_url
 
 from phototaxis_launcher.processes import Child
 from phototaxis_launcher.progress import Progress
@@ -81,7 +82,7 @@ class Run:
                 "recorder", *bus, f"--output={self.recording}", f"--grpc-port={grpc}", f"--web-port={web}"
             )
             if web > 0:
-                self.url = f"http://localhost:{web}/?url=rerun%2Bhttp%3A%2F%2Flocalhost%3A{grpc}%2Fproxy"
+                self.url = viewer_url(web, grpc)
 
     def _child(self, role: str, *arguments: str) -> Child:
         return Child(role, f"phototaxis_{role}", list(arguments), self.folder)

@@ -11,6 +11,7 @@ from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse
+from phototaxis.viewer import viewer_url
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -33,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     import rerun as rr
 
     from phototaxis_recorder.server import Server
-    from phototaxis_recorder.sinks import Page, fresh_file, live_url, open_recording, probe
+    from phototaxis_recorder.sinks import Page, fresh_file, open_recording, probe
     from phototaxis_recorder.translate import Translator
 
     output = Path(options.output)
@@ -54,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     page = Page(options.bind, web_port, grpc_port) if web_port >= 0 else None
     if page is not None:
-        print(f"recorder: watch at {live_url(web_port, grpc_port)}", file=sys.stderr, flush=True)
+        print(f"recorder: watch at {viewer_url(web_port, grpc_port)}", file=sys.stderr, flush=True)
 
     def serve(bus: Bus) -> None:
         Server(bus, start, finish).serve()

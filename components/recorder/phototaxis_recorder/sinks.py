@@ -68,8 +68,3 @@ class Page:
     def close(self) -> None:
         """End the program."""
         self._process.communicate()
-
-
-def live_url(web_port: int, grpc_port: int) -> str:
-    """What to open in a browser on this machine."""
-    return f"http://localhost:{web_port}/?url=rerun%2Bhttp%3A%2F%2Flocalhost%3A{grpc_port}%2Fproxy"

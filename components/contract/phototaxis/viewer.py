@@ -1,0 +1,6 @@
+"""Where the live view is found."""
+
+
+def viewer_url(web_port: int, grpc_port: int) -> str:
+    """The whole address of the web viewer on this machine, already connected to the recording."""
+    return f"http://localhost:{web_port}/?url=rerun%2Bhttp%3A%2F%2Flocalhost%3A{grpc_port}%2Fproxy"
