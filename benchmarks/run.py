@@ -189,7 +189,7 @@ def recorder_cost(arena: Arena, loop: Loop) -> float:
             translator.agent(AgentLog("b", 0, "w", "qtable", "simple", tick, zeros, zeros, ones, ones, ones))
             if first % 400 == 0:
                 translator.flush()
-        translator.flush()
+        translator.flush(last=True)
         seconds = time.perf_counter() - began
         recording.disconnect()
     return seconds / ticks * 1e6

@@ -49,7 +49,7 @@ class Server:
         if self._translator is not None:
             for topic in LOGS:
                 self._catch_up(topic, self._expected.get(topic, ("", 0))[1])
-            self._translator.flush()
+            self._translator.flush(last=True)
         self._finish()
 
     def _meet(self) -> None:
@@ -58,7 +58,7 @@ class Server:
         if world is None or world.run == self._run:
             return
         if self._translator is not None:
-            self._translator.flush()
+            self._translator.flush(last=True)
             self._finish()
         self._run, self._expected = world.run, {}
         self._translator = self._start(world)

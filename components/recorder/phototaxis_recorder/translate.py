@@ -1,8 +1,10 @@
 """From log chunks to Rerun columns: each tick once, in batches, whoever resends what."""
 
 import math
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,8 @@ from phototaxis.task import ACTIONS, PERCEPTS
 
 from phototaxis_recorder.layout import draw_world
 
+PATIENCE = 4000
+"""Rows of one role that may wait for the other's."""
 WORDS = {"reached": "reached the light", "cap": "gave up", "asked": "was reset"}
 
 
@@ -55,16 +59,22 @@ class Translator:
         if chunk.values:
             self._learned(chunk)
 
-    def flush(self) -> None:
-        """Write what is buffered."""
-        if rows := self._take("sim"):
+    def flush(self, last: bool = False) -> None:
+        """Write what is buffered, up to the newest tick of which both pose and rays are known.
+
+        So the newest picture is of one moment. The rest waits for the other role, unless this is the
+        `last` flush or too much is waiting.
+        """
+        waiting = max(map(len, self._rows.values()))
+        until = math.inf if last or waiting > PATIENCE else min(self._newest["sim"], self._newest["sensors"])
+        if rows := self._take("sim", until):
             tick, x, y, heading = rows
             place = np.stack([x, y, np.zeros_like(x)], axis=1)
             turn = np.zeros((len(tick), 4))
             turn[:, 2], turn[:, 3] = np.sin(heading / 2), np.cos(heading / 2)
             self._send("world/robot", tick, rr.Transform3D.columns(translation=place, quaternion=turn))
             self._send("world/trail", tick, rr.Points2D.columns(positions=place[:, :2]))
-        if rows := self._take("sensors"):
+        if rows := self._take("sensors", until):
             tick, sonar, light = rows
             rays = (sonar[:, :, None] * self._aim).reshape(-1, 2)
             starts = np.tile(self._mounts, (len(tick), 1))
@@ -72,7 +82,7 @@ class Translator:
             self._send("world/robot/sonar", tick, arrows)
             self._send("plots/light/left", tick, rr.Scalars.columns(scalars=light[:, 0]))
             self._send("plots/light/right", tick, rr.Scalars.columns(scalars=light[:, 1]))
-        if rows := self._take("agent"):
+        if rows := self._take("agent", until):
             tick, reward, error, temperature, action = rows
             self._send("plots/reward", tick, rr.Scalars.columns(scalars=reward))
             self._send("plots/td_error", tick, rr.Scalars.columns(scalars=error))
@@ -99,9 +109,11 @@ class Translator:
                 newest = row[0]
         self._newest[role] = newest
 
-    def _take(self, role: str) -> list[np.ndarray]:
-        rows, self._rows[role] = self._rows[role], []
-        return [np.array(column) for column in zip(*rows, strict=True)]
+    def _take(self, role: str, until: float) -> list[np.ndarray]:
+        rows = self._rows[role]
+        ready = bisect_right(rows, until, key=itemgetter(0))
+        self._rows[role] = rows[ready:]
+        return [np.array(column) for column in zip(*rows[:ready], strict=True)]
 
     def _send(self, path: str, tick: np.ndarray, columns: Any) -> None:
         index = [
