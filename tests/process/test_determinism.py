@@ -71,7 +71,7 @@ def test_lost_and_doubled_messages_change_nothing(start, alone, world, tmp_path)
         agent = unreliable("agent", "--checkpoint", str(checkpoint))
         status = wait_status(bus, lambda status: status.phase == "finished", sim, sensors, agent)
     agent.stop()
-    assert status.refused["command: another tick"] > 10  # doubled and repeated answers did arrive
+    assert status.refused["command: late or repeated"] > 10  # doubled and repeated answers did arrive
     found = json.loads(phototaxis("evaluate", checkpoint, "--placements", 20, "--json").stdout)
     assert found["placements"] == 20
     from phototaxis.checkpoint import load

@@ -91,8 +91,10 @@ class Server:
         elif event.topic == "alive":
             self._alive.add("/".join(event.message))
         elif event.topic == "gone":
-            self._alive.discard("/".join(event.message))
-            self._seat.leave(event.message[1])
+            role, ident = event.message
+            self._alive.discard(f"{role}/{ident}")
+            if role == "agent":
+                self._seat.leave(ident)
         elif event.topic == "stop":
             self._stopping = True
 
@@ -101,7 +103,7 @@ class Server:
         if command.run != state.run:
             return self._bus.refuse("command", f"another run: {command.run}")
         if command.tick != state.tick:
-            return self._bus.refuse("command", f"another tick: {command.tick} at {state.tick}")
+            return self._bus.refuse("command", f"late or repeated: for tick {command.tick}, at {state.tick}")
         if command.author != self._seat.driver or not command.author:
             return self._bus.refuse("command", f"not the driver: {command.author}")
         self._held = command
