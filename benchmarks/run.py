@@ -21,6 +21,7 @@ from phototaxis.arena import Arena, Disc, Light
 from phototaxis.messages import Command, Decoder, Message, Readings, State, World, encode
 from phototaxis.task import TaskOptions
 from phototaxis_agent.exploration import Exploration
+from phototaxis_agent.learner import Transition
 from phototaxis_agent.learners.qtable import Options
 from phototaxis_agent.setup import Setup
 from phototaxis_lab.loop import Loop, train
@@ -67,8 +68,9 @@ def main() -> None:
         print(f"  {name:60} {value:5.3f}")
 
     print("\nCost of one tick by part, in one process, µs")
-    for name, cost in parts(paper).items():
-        print(f"  {name:60} {cost:7.1f}")
+    bus = 1e6 / rates["four processes with recorder, ticks/s"] - 1e6 / rates["in-process, epochs/s"]
+    for name, cost in {**parts(paper), "bus: a tick over it less a step in one process": bus}.items():
+        print(f"  {name:65} {cost:7.1f}")
 
 
 def ratios(rounds: list[dict[str, float]]) -> dict[str, float]:
@@ -142,12 +144,14 @@ def parts(arena: Arena) -> dict[str, float]:
         "sensor suite (sonar, light, noise, message)": cost(lambda: loop.sensors(state)),
         "the same while three processes take turns on pipes": taking_turns(),
         "agent (percept, reward, learning, action, message)": cost(lambda: agent_step(loop, readings)),
+        "of which the learner (equation 1 and nine values)": cost(lambda: learner_step(loop)),
     }
     messages: list[tuple[Message, Any]] = [(state, State), (readings, Readings), (command, Command)]
     decoders = [Decoder(kind, 4096) for _, kind in messages]
     payloads = [encode(message) for message, _ in messages]
     sizes = ", ".join(f"{kind.__name__} {len(payload)}" for (_, kind), payload in zip(messages, payloads, strict=True))
-    costs[f"encode three messages ({sizes} bytes)"] = cost(lambda: [encode(message) for message, _ in messages])
+    print(f"  (messages: {sizes} bytes)")
+    costs["encode three messages"] = cost(lambda: [encode(message) for message, _ in messages])
     costs["decode and validate three messages"] = cost(
         lambda: [decode(payload) for decode, payload in zip(decoders, payloads, strict=True)]
     )
@@ -161,6 +165,12 @@ def agent_step(loop: Loop, readings: Readings) -> None:
     readings.episode = readings.tick // 50
     readings.author, readings.left, readings.right = "a", 1.0, 0.0
     loop.agent(readings)
+
+
+def learner_step(loop: Loop) -> None:
+    """What the agent asks of its learner in one step."""
+    loop.agent.learner.values((0, 0, 0, 0))
+    loop.agent.learner.learn(Transition((0, 0, 0, 0), 3, 0.01, (1, 0, 0, 0), False, 0.5))
 
 
 def taking_turns() -> float:

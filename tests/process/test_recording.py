@@ -51,6 +51,19 @@ def test_every_tick_is_in_the_recording(up):
     assert tables
 
 
+def test_a_restarted_recorder_asks_for_what_it_missed(up, world):
+    launcher = up("--epochs", 3000, "--seed", 1)
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.epoch > 500, launcher)
+        os.kill(children(launcher.popen.pid)["recorder"], signal.SIGKILL)
+    found = result(launcher)
+    assert found["restarts"] == {"recorder": 1}
+    assert Path(found["recording"]).name == "recording-2.rrd"
+    ticks = list(range(found["ticks"] + 1))
+    assert sorted(series(found["recording"], "/plots/reward", "Scalars:scalars")) == ticks
+    assert sorted(series(found["recording"], "/world/trail", "Points2D:positions")) == ticks
+
+
 def test_the_viewers_page_lives_and_dies_with_the_recorder(start, world, tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
