@@ -105,7 +105,7 @@ class Run:
                     if role != "agent":
                         child.start()
                 deadline = time.monotonic() + STARTING
-                while status.phase != "finished":
+                while not self._complete(status):
                     event = bus.receive(timeout=0.1)
                     self._watch(progress)
                     if event is not None and event.topic == "stop":
@@ -120,6 +120,10 @@ class Run:
                 progress.close()
                 self.stop()
         return status
+
+    def _complete(self, status: Status) -> bool:
+        """Finished, and all are there to take part in the ending (one may just have been restarted)."""
+        return status.phase == "finished" and self.children.keys() <= {who.split("/")[0] for who in status.alive}
 
     def _watch(self, progress: Progress) -> None:
         for child in self.children.values():
