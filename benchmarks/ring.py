@@ -8,7 +8,7 @@ Prints the ring's ticks/s: what Zenoh, Python's threads and this machine allow b
 import subprocess
 import sys
 import time
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from typing import Any
 
 import zenoh
@@ -32,8 +32,17 @@ def member(session: zenoh.Session, name: str, role: str) -> tuple[SimpleQueue[An
     return inbox, publisher
 
 
+def came(inbox: SimpleQueue[Any], seconds: float) -> bool:
+    """Whether something came within some seconds; it is taken out."""
+    try:
+        inbox.get(timeout=seconds)
+    except Empty:
+        return False
+    return True
+
+
 def follow(role: str, name: str) -> None:
-    """Pass on whatever comes until the standard input closes."""
+    """Pass on whatever comes until it is empty."""
     payload = bytes(SIZES[NEXT[role][1]])
     with open_session(role, BusOptions(name=name)) as session:
         inbox, publisher = member(session, name, role)
@@ -48,12 +57,10 @@ def lead(name: str, ticks: int) -> float:
     payload = bytes(SIZES["state"])
     with open_session("sim", BusOptions(name=name)) as session:
         inbox, publisher = member(session, name, "sim")
-        while inbox.empty():  # until both are there
+        while not came(inbox, 0.05):  # until both are there
             publisher.put(payload)
-            time.sleep(0.05)
-        time.sleep(0.2)
-        while not inbox.empty():
-            inbox.get()
+        while came(inbox, 0.2):  # what still goes round
+            pass
         began = time.perf_counter()
         for _ in range(ticks):
             publisher.put(payload)

@@ -8,12 +8,13 @@ Every message of the lockstep path is dropped with probability SHARE and doubled
 import random
 import sys
 from importlib import import_module
+from unittest.mock import patch
 
 from phototaxis.bus import Bus
 from phototaxis.topics import TOPICS
 
 module, share, options = sys.argv[1], float(sys.argv[2]), sys.argv[3:]
-chance = random.Random(module)  # noqa: S311
+chance = random.Random(module)
 put = Bus.put
 
 
@@ -25,5 +26,5 @@ def unreliable(bus: Bus, topic: str, message) -> None:
         put(bus, topic, message)
 
 
-setattr(Bus, "put", unreliable)  # noqa: B010
-import_module(f"{module}.__main__").main(options)
+with patch.object(Bus, "put", unreliable):
+    import_module(f"{module}.__main__").main(options)

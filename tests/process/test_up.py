@@ -10,7 +10,7 @@ import sys
 import msgspec
 import psutil
 import pytest
-from phototaxis.messages import Command, Control
+from phototaxis.messages import Command, Control, Decoder, State
 from phototaxis.session import BusOptions, open_session
 from phototaxis_launcher.cli import VERBS
 from support import children, observer, phototaxis, result, wait_status
@@ -50,11 +50,18 @@ def test_status_and_control_from_a_second_terminal(up, world, tmp_path):
 
 def test_real_time_keeps_the_pace_and_a_frozen_agent_comes_back(up, world):
     launcher = up("--epochs", 0, "--no-recorder", "--speed", 20)
-    with observer(world) as bus:
+    states: list[State] = []
+    decode = Decoder(State, 4096)
+    with observer(world) as bus, open_session("observer", BusOptions(name=world)) as reader:
+        reader.declare_subscriber(f"{world}/state", lambda sample: states.append(decode(sample.payload.to_bytes())))
         wait_status(bus, lambda status: status.tick > 20 and 30 < status.rate < 50, launcher)
         agent = children(launcher.popen.pid)["agent"]
         os.kill(agent, signal.SIGSTOP)
         wait_status(bus, lambda status: status.phase == "waiting" and "agent" in status.waiting_for, launcher)
+        last = max(state.tick for state in states if state.author)
+        stopped = next(state for state in states if state.tick == last + 1)
+        assert (stopped.left, stopped.right, stopped.author) == (0, 0, "")
+        assert stopped.driver  # the motors stopped by the clock, before the seat was lost
         os.kill(agent, signal.SIGCONT)
         frozen = wait_status(bus, lambda status: status.phase == "running", launcher)
         wait_status(bus, lambda status: status.tick > frozen.tick + 20, launcher)

@@ -1,10 +1,11 @@
-"""The step protocol's two small pieces, and the journal."""
+"""The step protocol's small pieces: answers, questions, pace, and the journal."""
 
 from pathlib import Path
 
 from making import readings
 from phototaxis.journal import Journal
 from phototaxis.protocol import Once, Question
+from phototaxis_sim.pace import Pace
 
 
 def test_once_answers_a_tick_once_and_repeats_the_answer():
@@ -29,6 +30,17 @@ def test_a_question_is_repeated_with_growing_pauses():
     question.asked(20)
     assert not question.due(20.5)
     assert question.due(21)
+
+
+def test_in_real_time_a_command_holds_for_two_periods():
+    pace = Pace(period=0.5, speed=2)
+    pace.set(2, now=10)
+    assert pace.wait(10) == 0.25
+    pace.commanded(10)
+    assert not pace.stale(10.5)
+    assert pace.stale(10.6)
+    pace.begun(10.25)
+    assert pace.wait(10.25) == 0.25
 
 
 def test_a_journal_survives_a_torn_end(tmp_path: Path):

@@ -40,7 +40,6 @@ class Server:
         self._bus, self._sim, self._pace, self._journal = bus, simulation, pace, journal
         self._seat, self._question = Seat(), Question()
         self._alive: set[str] = set()
-        self._sensed = 0
         self._held: Command | None = None
         self._paused = self._stopping = self._finished = False
         self._steps_due = 0
@@ -132,13 +131,11 @@ class Server:
 
     def _tick_by_clock(self, now: float) -> None:
         """In real time: the newest command holds until it is stale, then the motors stop."""
-        command = self._held
         state = self._sim.state
-        if command is not None and command.tick == state.tick:
+        if self._held is not None:
             self._answered()
-        elif self._seat.driver and not self._finished and not self._sim.finished:
-            held = command is not None and not command.end and not self._pace.stale(now)
-            motors = (state.left, state.right, state.author) if held else (0.0, 0.0, "")
+        elif self._seat.driver and not self._sim.finished:
+            motors = (0.0, 0.0, "") if self._pace.stale(now) else (state.left, state.right, state.author)
             self._apply(Entry(*motors, ""))
         self._pace.begun(now)
 
