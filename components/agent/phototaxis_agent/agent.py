@@ -1,6 +1,7 @@
 """The action-perception loop around a learner (section 5.1 and figure 7 of the paper)."""
 
 import math
+from operator import mul
 from typing import Any, NamedTuple
 
 import msgspec
@@ -8,7 +9,7 @@ import numpy as np
 from phototaxis.checkpoint import Meta, learner_hash
 from phototaxis.errors import UserError
 from phototaxis.messages import Command, End, Readings
-from phototaxis.task import ACTIONS, PERCEPTS, Memory, TaskOptions, lit
+from phototaxis.task import ACTIONS, PERCEPTS, Memory, State, TaskOptions, lit
 
 from phototaxis_agent.exploration import Exploration, draw
 from phototaxis_agent.learner import Learner, Transition, find
@@ -73,31 +74,37 @@ class Agent:
         self._strides = _strides(self.percept.sizes)
         self.visits = [0] * math.prod(self.percept.sizes)
         self._run, self._tick, self._episode, self._steps = "", -1, -1, 0
-        self._state: tuple[int, ...] | None = None
-        self._brightest = 0.0
+        self._state: State | None = None
+        self._linked = False
 
     def __call__(self, readings: Readings) -> Command:
         """Answer one tick: perceive, learn from the last action, choose the next."""
         if readings.run != self._run or readings.episode != self._episode or readings.tick != self._tick + 1:
             self._memory.clear()
-            self._state, self._steps = None, 0
+            self._state, self._steps, self._linked = None, 0, False
             self._run, self._episode = readings.run, readings.episode
         self._tick = readings.tick
-        unchanged = self._memory.unchanged(readings)
-        state = self.percept.state(readings, unchanged, self._near)
-        number = sum(map(int.__mul__, state, self._strides))
-        self.visits[number] += 1
+        memory, before = self._memory, self._state
+        memory.see(readings)
+        state = self.percept.state(readings, memory, self._near)
+        number = self._visit(state)
         done = lit(readings)
         reward = error = 0.0
-        if self._state is not None:
+        if before is None:
+            state += self.learner.context
+        else:
             self._steps += 1
-            reward = self._reward(self._brightest, readings, unchanged)
-            applied = _INDEX.get((readings.left, readings.right)) if readings.author else None
-            if self.learning and applied is not None:
+            reward = self._reward(max(memory.before), readings, memory.unchanged)
+            applied = _INDEX.get((readings.left, readings.right), -1) if readings.author else -1
+            state += self.learner.remember(before, applied, max(readings.light) - max(memory.before))
+            if self.learning and applied >= 0:
                 progress = min(self.epoch / self.budget, 1.0)
-                error = self.learner.learn(Transition(self._state, applied, reward, state, done, progress))
+                first, self._linked = not self._linked, True
+                error = self.learner.learn(Transition(before, applied, reward, state, done, progress, first))
                 self.epoch += 1
-        self._state, self._brightest = state, max(readings.light)
+            else:
+                self._linked = False
+        self._state = state
         temperature = self.exploration.temperature(self.epoch, self.budget) if self.learning else self.exploration.cold
         end: End = "reached" if done else "cap" if self._steps >= self.task.cap else ""
         action, (left, right) = -1, (0.0, 0.0)
@@ -107,12 +114,20 @@ class Agent:
         self.last = Step(number, action, reward, error, temperature)
         return Command(readings.run, readings.tick, self.author, left, right, end)
 
+    def _visit(self, state: State) -> int:
+        """The number of a percept's state, counted as met; 0 where states are real numbers."""
+        if not self.visits:
+            return 0
+        number = sum(map(mul, state, self._strides))
+        self.visits[number] += 1
+        return number
+
     def table(self) -> list[float]:
         """Q of every state and action, flattened row by row, 9 a row; 0 where an action is not allowed."""
         rows = np.zeros((len(self.visits), len(ACTIONS)))
         allowed = list(self.percept.actions)
         for number, state in enumerate(np.ndindex(*self.percept.sizes)):
-            rows[number, allowed] = self.learner.values(state)
+            rows[number, allowed] = self.learner.values((*state, *self.learner.context))
         return rows.ravel().tolist()
 
     def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
@@ -134,7 +149,7 @@ class Agent:
             steps=self._steps,
             lights=list(self._memory.lights),
             state=self._state or (),
-            brightest=self._brightest,
+            linked=self._linked,
             random=_map_numbers(str, self._rng.bit_generator.state),
             visits=list(self.visits),
             arena=self.arena,
@@ -178,7 +193,7 @@ class Agent:
         self.epoch, self.budget = meta.epoch, max(meta.budget, self.budget)
         self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
         self._memory.lights.extend(meta.lights)
-        self._state, self._brightest = meta.state or None, meta.brightest
+        self._state, self._linked = meta.state or None, meta.linked
 
     @property
     def tick(self) -> tuple[str, int]:

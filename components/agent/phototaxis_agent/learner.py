@@ -1,7 +1,7 @@
 """What a learner is, and how one is found by its name."""
 
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from phototaxis.errors import UserError
@@ -22,34 +22,86 @@ class Transition(NamedTuple):
     """The light was reached: nothing follows. (An episode cut short is not terminated.)"""
     progress: float
     """Share of the budget of learning steps that is used, 0..1: for rates that fall."""
+    first: bool
+    """Nothing leads here: an episode begins, or steps were missed. (Else it continues the last transition.)"""
 
 
-class Learner(Protocol):
+class Learner:
     """An action-value function that learns from transitions.
 
-    Made as ``Learner(options, percept, rng)``; `Options` is the class of its hyperparameters, a msgspec
-    Struct. All randomness comes from `rng`, so that a run can be repeated and continued.
+    A learner subclasses this and is made as ``Learner(options, percept, rng)``; `Options` is the class of
+    its hyperparameters, a msgspec Struct. All randomness comes from `rng`, so that a run can be repeated
+    and continued. A state is the percept's, followed by the learner's own `context`.
     """
 
     Options: type[Any]
+    presets: ClassVar[dict[str, dict[str, Any]]] = {}
+    """Defaults of options (any of an agent's) that differ for a percept, by the percept's name; "" for all."""
+    context: tuple[float, ...] = ()
+    """What the learner remembers beside the percept, as it is at the first step of an episode."""
 
     def __init__(self, options: Any, percept: Percept, rng: np.random.Generator): ...
 
     def values(self, state: State) -> list[float]:
         """Q(state, a) of the actions that the percept allows, in the order of `percept.actions`."""
-        ...
+        raise NotImplementedError
 
     def learn(self, transition: Transition) -> float:
         """Take in one transition; the temporal-difference error before the update."""
-        ...
+        raise NotImplementedError
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything learned, as named arrays."""
-        ...
+        raise NotImplementedError
 
     def load(self, arrays: dict[str, np.ndarray]) -> None:
         """Take over saved arrays; ValueError when they do not fit."""
-        ...
+        raise NotImplementedError
+
+    def remember(self, state: State, action: int, gain: float) -> tuple[float, ...]:
+        """The context that goes with the next percept.
+
+        `action` was applied in `state` (−1: none of the nine) and made the brighter reading grow by
+        `gain`. With arrays of shape (N,) instead of numbers it does the same for many robots.
+        """
+        return ()
+
+    def values_of(self, states: np.ndarray) -> np.ndarray:
+        """`values` of many states, (N, variables) → (N, actions); override it where that can be quicker."""
+        rows, which = np.unique(states, axis=0, return_inverse=True)
+        return np.array([self.values(tuple(row)) for row in rows.tolist()])[which.reshape(-1)]
+
+
+def discrete(percept: Percept, learner: str) -> Percept:
+    """The percept, if its states can be counted; for learners that keep a table.
+
+    Raises
+    ------
+    UserError
+        when they cannot.
+    """
+    if not all(percept.sizes):
+        raise UserError(f"--learner {learner}: needs a percept whose states can be counted, not '{percept.name}'")
+    return percept
+
+
+def falling(first: float, last: float, progress: float) -> float:
+    """A rate that falls geometrically from `first` to `last` while the budget is used up."""
+    return first * (last / first) ** progress
+
+
+def stored(arrays: dict[str, np.ndarray], name: str, like: np.ndarray) -> np.ndarray:
+    """The array `name`, if it has the shape and type of `like`; ValueError when not."""
+    array = arrays.get(name)
+    if array is None or array.shape != like.shape or array.dtype != like.dtype:
+        found = "none" if array is None else f"{array.shape} of {array.dtype}"
+        raise ValueError(f"expected {name} {like.shape} of {like.dtype}, found {found}")
+    return array
+
+
+def stored_rows(arrays: dict[str, np.ndarray], name: str, width: int) -> np.ndarray:
+    """The array `name`, if it has any number of rows of `width` float64 numbers; ValueError when not."""
+    return stored(arrays, name, np.empty((len(arrays.get(name, ())), width)))
 
 
 def available() -> dict[str, EntryPoint]:

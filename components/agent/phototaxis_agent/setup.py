@@ -9,7 +9,7 @@ from msgspec import Struct
 from phototaxis.checkpoint import Meta
 from phototaxis.errors import UserError
 from phototaxis.messages import World
-from phototaxis.options import parse_groups, peek
+from phototaxis.options import convert, parse_groups, peek
 from phototaxis.task import TaskOptions
 
 from phototaxis_agent.agent import Agent
@@ -47,6 +47,29 @@ class Setup(Struct):
             learning=learning,
             arena=world.arena.name,
         )
+
+
+def presets(learner: str, percept: str) -> dict[str, Any]:
+    """What a learner's author found best for a percept, where it differs from the options' defaults."""
+    kind = find(learner)
+    return {**kind.presets.get("", {}), **kind.presets.get(percept, {})}
+
+
+def make_setup(learner: str = "qtable", **given: Any) -> Setup:
+    """A setup with the learner's presets and some options given by name, as on a command line.
+
+    Raises
+    ------
+    UserError
+        for an unknown learner or option, or a value that does not fit.
+    """
+    structs = find(learner).Options, TaskOptions, Exploration
+    known = {field for struct in structs for field in struct.__struct_fields__}
+    if unknown := sorted(given.keys() - known):
+        raise UserError(f"no option '{unknown[0]}' of the learner {learner}; there are: {', '.join(sorted(known))}")
+    values = {**presets(learner, given.get("percept", TaskOptions().percept)), **given}
+    hyperparameters, task, exploration = (convert(struct, values) for struct in structs)
+    return Setup(learner, hyperparameters, task, exploration)
 
 
 DEFAULT_BUDGET = 3000
@@ -89,5 +112,7 @@ def parse_setup(struct: type[Any], argv: Sequence[str] | None, prog: str, about:
         "exploration": Exploration,
         f"hyperparameters of {name}": find(name).Options,
     }
-    own, chosen, task, exploration, hyperparameters = parse_groups(groups, words, prog, about)
+    defaults = presets(name, peek(words, "--percept", TaskOptions().percept))
+    parsed = parse_groups(groups, words, prog, about, defaults=defaults)
+    own, chosen, task, exploration, hyperparameters = parsed
     return own, Setup(chosen.learner, hyperparameters, task, exploration)

@@ -41,9 +41,10 @@ class Meta(Struct, forbid_unknown_fields=True, kw_only=True):
     steps: int
     lights: list[tuple[float, float]]
     """The percept's history."""
-    state: tuple[int, ...]
-    """The last percept, and the larger light reading that went with it."""
-    brightest: float
+    state: tuple[float, ...]
+    """The last state: percept and learner's context; empty for none."""
+    linked: bool
+    """Whether the last step was learned from, so that the next one continues it."""
     random: dict[str, Any]
     """State of the random generator, its large numbers as text."""
     visits: list[int]

@@ -7,8 +7,9 @@ import inspect
 import textwrap
 import types
 import typing
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import msgspec
@@ -39,16 +40,19 @@ def field_help(struct: type) -> dict[str, str]:
     return texts
 
 
-def add_options(parser: Any, struct: type, positional: Sequence[str] = ()) -> None:
+def add_options(
+    parser: Any, struct: type, positional: Sequence[str] = (), defaults: Mapping[str, Any] = MappingProxyType({})
+) -> None:
     """Give `parser` (or an argument group) one option for each field of `struct`.
 
-    Left out on the command line, a field keeps the Struct's default. Booleans are flags; lists may be
+    `defaults` are what the help says in place of the Struct's own. Left out on the command line, a field
+    keeps its default. Booleans are flags; lists may be
     repeated. Values are checked in `parse`, so that the messages come from one place.
     """
     texts = field_help(struct)
     for item in msgspec.structs.fields(struct):
         plain, choices = _plain(item.type)
-        default = None if item.default is msgspec.NODEFAULT else item.default
+        default = defaults.get(item.name, None if item.default is msgspec.NODEFAULT else item.default)
         shown = "" if default in (None, "", False) else f" (default {default})"
         help_text = (texts.get(item.name, "") + shown).replace("%", "%%")
         flag = "--" + item.name.replace("_", "-")
@@ -116,12 +120,16 @@ def parse_groups(
     prog: str,
     about: str,
     positional: Sequence[str] = (),
+    defaults: Mapping[str, Any] = MappingProxyType({}),
 ) -> list[Any]:
-    """Read a command line into several Structs, shown under their titles in the help."""
+    """Read a command line into several Structs, shown under their titles in the help.
+
+    `defaults` take the place of the Structs' own.
+    """
     parser = Parser(prog=prog, description=about)
     for title, struct in structs.items():
-        add_options(parser.add_argument_group(title) if title else parser, struct, positional)
-    values = vars(parser.parse_args(argv))
+        add_options(parser.add_argument_group(title) if title else parser, struct, positional, defaults)
+    values = {**defaults, **vars(parser.parse_args(argv))}
     return [convert(struct, values) for struct in structs.values()]
 
 

@@ -1,15 +1,16 @@
 """The light-seeking task of the paper: percepts, actions, rewards, and when the light is reached.
 
 "Combining Q-Learning with Artificial Neural Networks in an Adaptive Light Seeking Robot"; each
-definition names its section. Everything here is a pure function of the `Readings` of an episode.
+definition names its section. Percepts and the memory are written so that the same expressions serve one
+robot (numbers) and many at once (an array of shape (N,) wherever one robot has a number).
 """
 
+import math
 from collections import deque
-from typing import Annotated, Literal, Protocol
+from itertools import combinations
+from typing import Annotated, Any, Literal, Protocol
 
 from msgspec import Meta, Struct
-
-from phototaxis.messages import Readings
 
 REACHED = 0.95
 """A light reading above this counts as the light (section 4.4)."""
@@ -19,6 +20,9 @@ EQUAL = 0.01
 
 STEPS = 5
 """How many consecutive steps must be equal to count as unchanged (section 4.2)."""
+
+DARK = 0.005
+"""Below this the logarithm of a light reading falls no more (reward scheme "potential")."""
 
 ACTIONS: tuple[tuple[float, float], ...] = (
     (0.0, 0.0), (0.0, 1.0), (0.0, -1.0),
@@ -30,51 +34,87 @@ ACTIONS: tuple[tuple[float, float], ...] = (
 FORWARD = tuple(i for i, (left, right) in enumerate(ACTIONS) if left + right >= 0)
 """The actions without net backward motion, which the rich percept allows (section 4.2)."""
 
+MIRRORED = tuple(ACTIONS.index((right, left)) for left, right in ACTIONS)
+"""Each action seen in a mirror: left and right exchanged."""
+
 FRONT, BACK, LEFT, RIGHT = (3, 4), (11, 12), (0, 15), (7, 8)
 """Sonar groups (figure 3), by index into `Readings.sonar`; a group reads its minimum."""
 
-State = tuple[int, ...]
+State = tuple[float, ...]
 
 
-def lit(readings: Readings) -> bool:
+class Senses(Protocol):
+    """What percepts read: `Readings`, or the same fields with an array wherever one robot has a number."""
+
+    sonar: Any
+    """16 ranges, m."""
+    light: Any
+    """Front left, front right, 0..1."""
+    front: Any
+    rear: Any
+
+
+def lit(senses: Senses) -> bool:
     """Whether the light is reached: either sensor reads above 0.95 (section 4.4)."""
-    return max(readings.light) > REACHED
+    left, right = senses.light
+    return (left > REACHED) | (right > REACHED)
 
 
 class Memory:
-    """Whether the light readings have not changed in 5 consecutive steps (section 4.2, variable z).
-
-    Unchanged: the last five readings of an episode lie within 0.01 of each other, on both sides.
-    """
+    """The light readings of the last steps of an episode."""
 
     def __init__(self) -> None:
-        self.lights: deque[tuple[float, float]] = deque(maxlen=STEPS)
+        self.lights: deque[tuple[Any, Any]] = deque(maxlen=STEPS)
 
     def clear(self) -> None:
         """Begin a new episode."""
         self.lights.clear()
 
-    def unchanged(self, readings: Readings) -> bool:
-        """Remember the readings of one step, and say whether five are equal."""
-        self.lights.append(readings.light)
+    def see(self, senses: Senses) -> None:
+        """Remember the readings of one step."""
+        self.lights.append(senses.light)
+
+    @property
+    def before(self) -> tuple[Any, Any]:
+        """The readings of the step before; at the first step those of that step."""
+        return self.lights[-2] if len(self.lights) > 1 else self.lights[-1]
+
+    @property
+    def unchanged(self) -> bool:
+        """Whether the light has not changed in 5 consecutive steps (section 4.2, variable z).
+
+        The last five readings of an episode lie within 0.01 of each other, on both sides.
+        """
         if len(self.lights) < STEPS:
             return False
-        lefts, rights = zip(*self.lights, strict=True)
-        return max(lefts) - min(lefts) <= EQUAL and max(rights) - min(rights) <= EQUAL
+        same: Any = True
+        for one, other in combinations(self.lights, 2):
+            same = same & (abs(one[0] - other[0]) <= EQUAL) & (abs(one[1] - other[1]) <= EQUAL)
+        return same
+
+
+def _near(senses: Senses, group: tuple[int, int], threshold: float) -> Any:
+    """1 where a sonar group reads below the threshold, else 0."""
+    one, other = group
+    return 1 * ((senses.sonar[one] < threshold) | (senses.sonar[other] < threshold))
 
 
 class Percept(Protocol):
-    """How readings become a discrete state."""
+    """How readings become what the learner sees."""
 
     name: str
+    variables: tuple[str, ...]
     sizes: tuple[int, ...]
-    """Number of values of each variable; their product is the number of states."""
-    variables: str
+    """Number of values of each variable; 0 for a real number in −1..1."""
     actions: tuple[int, ...]
     """The actions that may be taken, as indices into `ACTIONS`."""
 
-    def state(self, readings: Readings, unchanged: bool, near: float) -> State:
-        """The state: one value for each variable. `near` is the obstacle threshold in metres."""
+    def state(self, senses: Senses, memory: Memory, near: float) -> State:
+        """One value for each variable. `near` is the obstacle threshold in m; `memory` has seen `senses`."""
+        ...
+
+    def mirror(self, state: State) -> State:
+        """The state that a mirror would show: left and right exchanged."""
         ...
 
 
@@ -86,17 +126,19 @@ class Simple:
     """
 
     name = "simple"
+    variables: tuple[str, ...] = ("w", "x", "y", "z")
     sizes: tuple[int, ...] = (3, 2, 2, 2)
-    variables = "wxyz"
     actions: tuple[int, ...] = tuple(range(len(ACTIONS)))
 
-    def state(self, readings: Readings, unchanged: bool, near: float) -> State:
-        left, right = readings.light
-        sonar = readings.sonar
-        brighter = 2 if abs(left - right) <= EQUAL else int(right > left)
-        front = min(sonar[3], sonar[4]) < near
-        back = min(sonar[11], sonar[12]) < near
-        return brighter, int(front), int(back), int(unchanged)
+    def state(self, senses: Senses, memory: Memory, near: float) -> State:
+        left, right = senses.light
+        differ = 1 * (abs(left - right) > EQUAL)
+        brighter = 2 - differ * (2 - (right > left))
+        return brighter, _near(senses, FRONT, near), _near(senses, BACK, near), 1 * memory.unchanged
+
+    def mirror(self, state: State) -> State:
+        brighter, front, back, unchanged, *rest = state
+        return (brighter if brighter == 2 else 1 - brighter), front, back, unchanged, *rest
 
 
 class Rich:
@@ -107,38 +149,86 @@ class Rich:
     """
 
     name = "rich"
+    variables: tuple[str, ...] = ("u", "v", "w", "x", "y", "z")
     sizes: tuple[int, ...] = (5, 5, 2, 2, 2, 2)
-    variables = "uvwxyz"
     actions: tuple[int, ...] = FORWARD
 
-    def state(self, readings: Readings, unchanged: bool, near: float) -> State:
-        left, right = readings.light
-        sonar = readings.sonar
-        front = min(sonar[i] for i in FRONT) < near
-        at_right = min(sonar[i] for i in RIGHT) < near
-        at_left = min(sonar[i] for i in LEFT) < near
-        bins = min(int(left * 5), 4), min(int(right * 5), 4)
-        return *bins, int(front), int(at_right), int(at_left), int(unchanged)
+    def state(self, senses: Senses, memory: Memory, near: float) -> State:
+        left, right = (sum(light * 5 >= edge for edge in (1, 2, 3, 4)) for light in senses.light)
+        front, at_right, at_left = (_near(senses, group, near) for group in (FRONT, RIGHT, LEFT))
+        return left, right, front, at_right, at_left, 1 * memory.unchanged
+
+    def mirror(self, state: State) -> State:
+        left, right, front, at_right, at_left, unchanged, *rest = state
+        return right, left, front, at_left, at_right, unchanged, *rest
 
 
-PERCEPTS: dict[str, Percept] = {"simple": Simple(), "rich": Rich()}
+class Continuous:
+    """Beyond the paper: eleven real numbers, and no reverse.
+
+    The square root of each light (for the paper's light law 1 / distance); their contrast
+    (left − right) / (left + right); the relative change of each since the last step; how near the front,
+    back, left and right sonar groups are, from 0 at 1 m to 1 at 0 m; the two bumpers.
+    """
+
+    name = "continuous"
+    variables: tuple[str, ...] = (
+        "left", "right", "contrast", "left change", "right change",
+        "near front", "near back", "near left", "near right", "front bumper", "rear bumper",
+    )  # fmt: skip
+    sizes: tuple[int, ...] = (0,) * len(variables)
+    actions: tuple[int, ...] = FORWARD
+
+    def state(self, senses: Senses, memory: Memory, near: float) -> State:
+        (left, right), (left_before, right_before) = senses.light, memory.before
+        near_front, near_back, near_left, near_right = (
+            _nearness(senses.sonar[one], senses.sonar[other]) for one, other in (FRONT, BACK, LEFT, RIGHT)
+        )
+        return (
+            left**0.5, right**0.5, _contrast(left, right), _contrast(left, left_before), _contrast(right, right_before),
+            near_front, near_back, near_left, near_right, 1.0 * senses.front, 1.0 * senses.rear,
+        )  # fmt: skip
+
+    def mirror(self, state: State) -> State:
+        left, right, contrast, left_change, right_change, front, back, at_left, at_right, *rest = state
+        return right, left, -contrast, right_change, left_change, front, back, at_right, at_left, *rest
+
+
+def _contrast(one: Any, other: Any) -> Any:
+    """How much brighter one reading is than another, −1..1; readings below 0.001 count as dark."""
+    return (one - other) / (one + other + 0.001)
+
+
+def _nearness(one: Any, other: Any) -> Any:
+    """0 where both ranges are 1 m or more, 1 where the smaller is 0."""
+    closer = (one + other - abs(one - other)) / 2
+    return 1 - (closer + 1 - abs(closer - 1)) / 2
+
+
+PERCEPTS: dict[str, Percept] = {percept.name: percept for percept in (Simple(), Rich(), Continuous())}
+
+Scheme = Literal["difference", "static", "potential"]
 
 
 class Reward(Struct, frozen=True):
-    """The reinforcement values of section 4.4.
+    """The reinforcement values of section 4.4, and one more scheme.
 
-    In this order: +3 at the light; −2 for a collision in front or at the rear; −2 while the light is
-    unchanged for 5 steps; else by the larger of the two readings, either its difference to the last
-    step ("difference", the simple percept's) or `approach` for any increase ("static", the rich one's).
+    In this order: `goal` at the light; `collision` in front or at the rear; `unchanged` while the light
+    is unchanged for 5 steps; else by the brighter of the two readings:
+
+    - "difference" (the simple percept's): its difference to the last step;
+    - "static" (the rich one's): `approach` for any increase;
+    - "potential" (not the paper's): the difference of its logarithm, a potential-based shaping (Ng, Harada
+      and Russell 1999): a circle earns nothing, and a step towards the light earns alike near and far.
     """
 
-    scheme: Literal["difference", "static"]
+    scheme: Scheme
     goal: float = 3.0
     collision: float = -2.0
     unchanged: float = -2.0
     approach: float = 2.0
 
-    def __call__(self, brightest: float, now: Readings, unchanged: bool) -> float:
+    def __call__(self, brightest: float, now: Senses, unchanged: bool) -> float:
         """The reward of the step that led to `now`; `brightest` is the larger light reading before it."""
         if lit(now):
             return self.goal
@@ -146,26 +236,34 @@ class Reward(Struct, frozen=True):
             return self.collision
         if unchanged:
             return self.unchanged
-        gain = max(now.light) - brightest
-        if self.scheme == "difference":
-            return gain
-        return self.approach if gain > 0 else 0.0
+        brighter = max(now.light)
+        if self.scheme == "static":
+            return self.approach if brighter > brightest else 0.0
+        if self.scheme == "potential":
+            return math.log(max(brighter, DARK) / max(brightest, DARK))
+        return brighter - brightest
 
 
-OWN_REWARD: dict[str, Literal["difference", "static"]] = {"simple": "difference", "rich": "static"}
-"""The scheme that the paper gave each percept."""
+REWARDS: dict[str, Reward] = {
+    "difference": Reward("difference"),
+    "static": Reward("static"),
+    "potential": Reward("potential", collision=-2.0, unchanged=-1.0),
+}
+
+OWN_REWARD: dict[str, Scheme] = {"simple": "difference", "rich": "static", "continuous": "potential"}
+"""The scheme that the paper gave each of its percepts."""
 
 
 class TaskOptions(Struct, kw_only=True):
     """What is to be learned."""
 
-    percept: Literal["simple", "rich"] = "simple"
-    """what the learner sees: 24 or 400 states"""
-    reward: Literal["own", "difference", "static"] = "own"
-    """reward scheme; own: the paper's for the percept (simple: difference, rich: static)"""
+    percept: Literal["simple", "rich", "continuous"] = "simple"
+    """what the learner sees: 24 states, 400 states (both the paper's), or 11 real numbers"""
+    reward: Literal["own", "difference", "static", "potential"] = "own"
+    """reward scheme; own: the percept's (simple: difference, rich: static, continuous: potential)"""
     cap: Annotated[int, Meta(ge=1)] = 100
     """steps after which an episode is given up while learning"""
 
     def scheme(self) -> Reward:
         """The reward function."""
-        return Reward(OWN_REWARD[self.percept] if self.reward == "own" else self.reward)
+        return REWARDS[OWN_REWARD[self.percept] if self.reward == "own" else self.reward]

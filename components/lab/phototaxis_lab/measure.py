@@ -1,16 +1,18 @@
 """How good is a frozen policy? Measured on fresh random placements."""
 
 import math
+from collections.abc import Callable
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 from phototaxis.arena import Arena
-from phototaxis.messages import Episode
-from phototaxis.task import REACHED
+from phototaxis.messages import World
+from phototaxis.task import REACHED, lit
 from phototaxis_agent.agent import Agent
-
-from phototaxis_lab.loop import Loop
+from phototaxis_agent.crowd import CrowdAgent, CrowdReadings
+from phototaxis_sensors.crowd import CrowdSuite
+from phototaxis_sim.crowd import Crowd
+from phototaxis_sim.physics import Physics, Pose
 
 SEED_OFFSET = 1_000_000_007
 """Added to an evaluation's seed, so that its placements and noise are none of the training's."""
@@ -28,48 +30,68 @@ class Evaluation(Struct):
     steps_mean: float | None
     """Mean steps of the successful placements; None without any."""
     path_ratio: float | None
-    """Steps over straight-line steps, mean of the successful placements."""
+    """All steps of the successful placements over the steps of their direct ways (`direct_steps`)."""
+    within_100: float
+    """Share of placements from which the light was reached within 100 steps."""
     cap: int
     seed: int
 
 
-def straight_steps(arena: Arena, start: Episode) -> float:
-    """Steps at full speed along the straight line to where the first light reads above 0.95.
+def direct_steps(arena: Arena, start: Pose) -> float:
+    """Steps to turn on the spot towards a light and drive straight to where it reads above 0.95.
 
-    A lower bound that ignores turning and obstacles; at least 1.
+    The light that takes the fewest; obstacles are ignored; at least 1.
     """
     motion, robot, law = arena.motion, arena.robot, arena.sensing
     ahead = max(x for x, _ in robot.light_sensors)
-    nearest = math.inf
+    fewest = math.inf
     for light in arena.lights:
         if law.light_law == "linear":
             radius = law.light_range * (1 - REACHED / light.brightness)
         else:
             radius = math.sqrt(light.brightness / REACHED)
-        nearest = min(nearest, math.dist((start.x, start.y), light.position) - radius - ahead)
-    return max(nearest / (robot.speed * motion.control_period), 1.0)
+        dx, dy = light.position[0] - start.x, light.position[1] - start.y
+        turn = abs(math.remainder(math.atan2(dy, dx) - start.heading, math.tau))
+        straight = max(math.hypot(dx, dy) - radius - ahead, 0.0)
+        fewest = min(fewest, (turn / robot.turn + straight / robot.speed) / motion.control_period)
+    return max(fewest, 1.0)
 
 
 def evaluate(arena: Arena, agent: Agent, placements: int, seed: int, cap: int = CAP) -> Evaluation:
-    """Place the robot `placements` times at random and let the frozen agent drive."""
-    if agent.learning:
-        raise ValueError("an agent that is evaluated must not learn")
-    agent.task = msgspec.structs.replace(agent.task, cap=cap)
-    loop = Loop(arena, agent, seed + SEED_OFFSET)
-    steps, ratios = [], []
-    for _ in range(placements):
-        while (ended := loop.step()) is None:
-            pass
-        if ended.end == "reached":
-            steps.append(ended.steps)
-            ratios.append(ended.steps / straight_steps(arena, ended))
+    """Place `placements` robots at random, one at a place, and let the frozen agent drive each for `cap` steps."""
+    return measure(arena, lambda count: CrowdAgent(agent, arena.sensing.near, count, seed), placements, seed, cap)
+
+
+Policy = Callable[[CrowdReadings], np.ndarray]
+"""From what N robots sense to their motor commands, (N, 2)."""
+
+
+def measure(
+    arena: Arena, policy: Callable[[int], Policy], placements: int, seed: int, cap: int = CAP
+) -> Evaluation:
+    """The same for any policy; `policy` makes one for a number of robots."""
+    seed += SEED_OFFSET
+    physics, drive = Physics(arena), policy(placements)
+    starts = [physics.random_pose(np.random.default_rng((seed, number))) for number in range(placements)]
+    crowd, suite = Crowd(arena, starts), CrowdSuite(World("evaluation", arena, seed, 0))
+    steps = np.full(placements, -1)
+    for step in range(cap + 1):
+        readings = CrowdReadings(*suite(step, crowd.poses), crowd.front, crowd.rear)
+        steps[(steps < 0) & lit(readings)] = step
+        if step == cap or (steps >= 0).all():
+            break
+        left, right = np.where(steps < 0, drive(readings).T, 0.0)
+        crowd.drive(left, right)
+    reached = steps >= 0
+    bounds = np.array([direct_steps(arena, start) for start in starts])
     return Evaluation(
         placements=placements,
-        success_rate=len(steps) / placements,
-        steps_mean=float(np.mean(steps)) if steps else None,
-        path_ratio=float(np.mean(ratios)) if ratios else None,
+        success_rate=float(reached.mean()),
+        steps_mean=float(steps[reached].mean()) if reached.any() else None,
+        path_ratio=float(steps[reached].sum() / bounds[reached].sum()) if reached.any() else None,
+        within_100=float((reached & (steps <= 100)).mean()),
         cap=cap,
-        seed=seed,
+        seed=seed - SEED_OFFSET,
     )
 
 
@@ -79,5 +101,5 @@ def describe(found: Evaluation) -> str:
         f"{found.success_rate:.1%} of {found.placements} fresh placements reached the light within {found.cap} steps"
     )
     if found.steps_mean is not None:
-        words += f"; {found.steps_mean:.1f} steps on average, {found.path_ratio:.1f} × the straight line"
+        words += f"; {found.steps_mean:.1f} steps on average, {found.path_ratio:.1f} × the direct way"
     return words

@@ -1,18 +1,18 @@
 """`phototaxis train`: the same learning as over the bus, in one process."""
 
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-import msgspec
-from msgspec import Meta, Struct
+from msgspec import Meta
 from phototaxis.checkpoint import save
 from phototaxis.errors import UserError
 
+from phototaxis_lab.experiment import Running, seed_range
 
-class Options(Struct, kw_only=True):
+
+class Options(Running, kw_only=True):
     """Options of `phototaxis train`."""
 
     arena: str = "paper"
@@ -20,7 +20,7 @@ class Options(Struct, kw_only=True):
     seed: int = 0
     """decides everything: placements, noise, the learner and its exploration"""
     seeds: Annotated[str, Meta(pattern=r"^([0-9]+:[0-9]+)?$")] = ""
-    """A:B: learn with each seed from A to B − 1 and evaluate each, over all cores"""
+    """A:B: learn with each seed from A to B − 1 and evaluate each on 200 fresh placements"""
     epochs: Annotated[int, Meta(ge=1)] = 3000
     """learning steps"""
     checkpoint: str = ""
@@ -78,23 +78,23 @@ def one(options: Options, setup: Any, arena: Any) -> dict[str, Any]:
 
 
 def many(options: Options, setup: Any, arena: Any) -> dict[str, Any]:
-    """Many seeds: the success of each, median and worst."""
-    from tqdm import tqdm
+    """Many seeds: the success of each, and what they come to."""
+    from phototaxis_lab.cell import Cell, System
+    from phototaxis_lab.grid import summary, watched
 
-    from phototaxis_lab.study import study, summary
-
-    first, _, last = options.seeds.partition(":")
-    seeds = range(int(first), int(last))
-    if not seeds:
-        raise UserError(f"--seeds {options.seeds}: no seed from {first} to {last}")
-    progress = tqdm(study(setup, arena, options.epochs, seeds), total=len(seeds), disable=not sys.stderr.isatty())
-    outcomes = list(progress)
-    found = {"epochs": options.epochs, "seeds": msgspec.to_builtins(outcomes), **summary(outcomes)}
+    system = System.of(setup, options.arena)
+    cells = [Cell(system, options.epochs, seed) for seed in seed_range(options.seeds)]
+    outcomes = [outcome for _, outcome in sorted(watched(cells, options))]
+    fields = "seed", "success_rate", "within_100", "steps_mean", "path_ratio", "learner_hash"
+    seeds = [{field: getattr(outcome, field) for field in fields} for outcome in outcomes]
+    found = {"learner": system.learner, "epochs": options.epochs, "seeds": seeds, **summary(outcomes)}
     if not options.json:
-        for outcome in outcomes:
-            print(f"seed {outcome.seed:4}  {outcome.success_rate:6.1%} of 200 fresh placements")
-        print(
-            f"median {found['median']:.1%}, worst {found['min']:.1%}, "
-            f"{found['at_least_80_percent']:.0%} of the seeds at 80% or better"
-        )
+        for one in seeds:
+            ratio = "" if one["path_ratio"] is None else f"; path ratio {one['path_ratio']:.1f}"
+            print(
+                f"seed {one['seed']:4}  {one['success_rate']:6.1%} of 200 fresh placements, "
+                f"{one['within_100']:6.1%} within 100 steps{ratio}"
+            )
+        low, high = found["interval"]
+        print(f"median {found['median']:.1%} (95% interval {low:.1%} to {high:.1%}), worst {found['min']:.1%}")
     return found

@@ -31,6 +31,8 @@ VERBS = {
     "agent": Verb("phototaxis_agent.__main__:main", "agent", "an agent alone"),
     "recorder": Verb("phototaxis_recorder.__main__:main", "recorder", "the recorder alone"),
     "train": Verb("phototaxis_lab.train:main", "lab", "the same learning in one process, without a bus"),
+    "experiment": Verb("phototaxis_lab.experiment:main", "lab", "a grid of agents and seeds, in parallel, resumable"),
+    "reproduce": Verb("phototaxis_lab.reproduce:main", "lab", "the paper's experiments: a page of claims and figures"),
     "evaluate": Verb("phototaxis_lab.evaluate:main", "lab", "measure a frozen policy on fresh placements"),
 }
 

@@ -6,7 +6,7 @@ from phototaxis.arena import Arena, Light
 
 from phototaxis_sensors.scene import Scene
 
-_SHORT = 0.1
+SHORT = 0.1
 """The line of sight stops this far from the light, m, so that a lamp may stand in a socket."""
 
 
@@ -35,9 +35,9 @@ class LightModel:
         if self._sensing.body_shadow and self._through_body(lx, ly, sx, sy):
             return 0.0
         distance = math.hypot(lx - sx, ly - sy)
-        if distance > _SHORT:
+        if distance > SHORT:
             eye = x + cos * sx - sin * sy, y + sin * sx + cos * sy
-            share = 1 - _SHORT / distance
+            share = 1 - SHORT / distance
             lamp = (
                 eye[0] + share * (light.position[0] - eye[0]),
                 eye[1] + share * (light.position[1] - eye[1]),

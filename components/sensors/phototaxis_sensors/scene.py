@@ -12,7 +12,10 @@ class Scene:
 
     def __init__(self, arena: Arena):
         self._space = pymunk.Space()
-        self._space.add(*static_shapes(arena, self._space.static_body))
+        body = self._space.static_body
+        self._space.add(*static_shapes(arena, body))
+        for wall in arena.walls:  # a segment's own query overlooks its round end where a ray meets the side too
+            self._space.add(*(pymunk.Circle(body, wall.thickness / 2, end) for end in (wall.start, wall.end)))
 
     def hit(self, start: tuple[float, float], end: tuple[float, float]) -> float:
         """Where between `start` (0) and `end` (1) the ray first hits; 1 when it hits nothing."""

@@ -7,7 +7,7 @@ from phototaxis.arena import Arena
 
 from phototaxis_sensors.scene import Scene
 
-_BACK_OFF = 0.1
+BACK_OFF = 0.1
 """A ray starts this far inside the body, m, so that a rim pressed into a wall reads 0 and not what is behind it."""
 
 
@@ -17,11 +17,11 @@ class SonarModel:
     def __init__(self, arena: Arena, scene: Scene):
         robot = arena.robot
         self._scene, self._range = scene, robot.sonar_range
-        self._reach = robot.sonar_range + _BACK_OFF
+        self._reach = robot.sonar_range + BACK_OFF
         mounts = np.array([sonar.position for sonar in robot.sonars])
         angles = np.array([sonar.angle for sonar in robot.sonars])
         aim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        starts = mounts - _BACK_OFF * aim
+        starts = mounts - BACK_OFF * aim
         self._points = np.concatenate([starts, starts + self._reach * aim])  # (32, 2): starts, then ends
 
     def __call__(self, x: float, y: float, heading: float) -> list[float]:
@@ -31,5 +31,5 @@ class SonarModel:
         turned += (x, y)
         points = turned.tolist()
         hit, reach = self._scene.hit, self._reach
-        found = [reach * hit(start, end) - _BACK_OFF for start, end in zip(points[:16], points[16:], strict=True)]
+        found = [reach * hit(start, end) - BACK_OFF for start, end in zip(points[:16], points[16:], strict=True)]
         return [distance if distance > 0 else 0.0 for distance in found]

@@ -39,6 +39,30 @@ class Motion(NamedTuple):
     rear: bool
 
 
+def new_space(arena: Arena) -> pymunk.Space:
+    """A space with everything in it that does not move."""
+    space = pymunk.Space()
+    space.damping = 0.0  # velocity is what the force of this step makes it: no inertia
+    space.collision_slop = 0.001
+    space.collision_bias = 1e-6
+    space.iterations = 20
+    for shape in static_shapes(arena, space.static_body):
+        shape.friction = arena.motion.friction
+        space.add(shape)
+    return space
+
+
+def add_robot(space: pymunk.Space, arena: Arena) -> tuple[pymunk.Body, pymunk.Poly]:
+    """Add the robot's body."""
+    size = (arena.robot.length, arena.robot.width)
+    body = pymunk.Body(_MASS, _GRIP * pymunk.moment_for_box(_MASS, size))
+    box = pymunk.Poly.create_box(body, size)
+    box.collision_type = _ROBOT
+    box.friction = arena.motion.friction
+    space.add(body, box)
+    return body, box
+
+
 class Physics:
     """The arena and the robot's body in one pymunk space.
 
@@ -56,23 +80,12 @@ class Physics:
         self._steps = arena.physics_steps
         self._stall = arena.motion.collision == "stall"
         self._front = self._rear = False
-        space = self._space = pymunk.Space()
-        space.damping = 0.0  # velocity is what the force of this step makes it: no inertia
-        space.collision_slop = 0.001
-        space.collision_bias = 1e-6
-        space.iterations = 20
-        for shape in static_shapes(arena, space.static_body):
-            shape.friction = arena.motion.friction
-            space.add(shape)
-        size = (self._robot.length, self._robot.width)
-        self._body = pymunk.Body(_MASS, _GRIP * pymunk.moment_for_box(_MASS, size))
-        self._box = pymunk.Poly.create_box(self._body, size)
-        self._box.collision_type = _ROBOT
-        self._box.friction = arena.motion.friction
+        space = self._space = new_space(arena)
+        self._body, self._box = add_robot(space, arena)
         self._moment = self._body.moment
+        size = (self._robot.length, self._robot.width)
         clear = arena.placement.clearance
         self._probe = pymunk.Poly.create_box(None, (size[0] + 2 * clear, size[1] + 2 * clear))
-        space.add(self._body, self._box)
         space.on_collision(_ROBOT, None, post_solve=self._touched)
 
     def place(self, pose: Pose) -> Motion:

@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Meta, Struct
 from phototaxis.task import ACTIONS, Percept, State
 
-from phototaxis_agent.learner import Transition
+from phototaxis_agent.learner import Learner, Transition, discrete, falling, stored
 
 
 class Options(Struct, frozen=True, kw_only=True):
@@ -21,14 +21,14 @@ class Options(Struct, frozen=True, kw_only=True):
     """discount factor γ of equation 1"""
 
 
-class QTable:
+class QTable(Learner):
     """One entry for each state and action: 24·9 = 216 (simple) or 400·9 = 3,600 (rich)."""
 
     Options = Options
 
     def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
         self._options = options
-        self._index = {state: i for i, state in enumerate(product(*map(range, percept.sizes)))}
+        self._index = {state: i for i, state in enumerate(product(*map(range, discrete(percept, "qtable").sizes)))}
         self._allowed = percept.actions
         shape = len(self._index), len(ACTIONS)
         self._table: list[list[float]] = rng.uniform(-0.15, 0.15, shape).tolist()  # section 5.1, step 1
@@ -39,20 +39,16 @@ class QTable:
 
     def learn(self, transition: Transition) -> float:
         """Equation 1: Q(s, a) += α [r + γ max Q(s', a') − Q(s, a)]; at the light nothing follows."""
-        state, action, reward, following, terminated, progress = transition
+        state, action, reward, following, terminated, progress, _ = transition
         options = self._options
         target = reward if terminated else reward + options.gamma * max(self.values(following))
         row = self._table[self._index[state]]
         error = target - row[action]
-        row[action] += options.alpha * (options.alpha_end / options.alpha) ** progress * error
+        row[action] += falling(options.alpha, options.alpha_end, progress) * error
         return error
 
     def save(self) -> dict[str, np.ndarray]:
         return {"table": np.array(self._table)}
 
     def load(self, arrays: dict[str, np.ndarray]) -> None:
-        table, expected = arrays.get("table"), (len(self._index), len(ACTIONS))
-        if table is None or table.shape != expected or table.dtype != np.float64:
-            found = "none" if table is None else f"{table.shape} of {table.dtype}"
-            raise ValueError(f"expected a table of {expected}, found {found}")
-        self._table = table.tolist()
+        self._table = stored(arrays, "table", self.save()["table"]).tolist()

@@ -1,0 +1,62 @@
+"""A frozen agent for many robots at once: the same percepts, values and draws as `Agent`, in arrays."""
+
+from typing import NamedTuple
+
+import numpy as np
+from phototaxis.task import ACTIONS, Memory
+
+from phototaxis_agent.agent import Agent
+
+_MOTORS = np.array(ACTIONS)
+
+
+class CrowdReadings(NamedTuple):
+    """What N robots sense at one tick; the fields of `Readings` that percepts read."""
+
+    sonar: np.ndarray
+    """(16, N) m."""
+    light: np.ndarray
+    """(2, N) 0..1: front left, front right."""
+    front: np.ndarray
+    """(N,) bool."""
+    rear: np.ndarray
+
+
+class CrowdAgent:
+    """Drives N robots through one episode each, all of which begin at the same tick."""
+
+    def __init__(self, agent: Agent, near: float, count: int, seed: int):
+        self._learner, self._percept, self._near = agent.learner, agent.percept, near
+        self._temperature = agent.exploration.cold
+        self._rng = np.random.default_rng(seed)
+        self._memory = Memory()
+        self._context = np.tile(np.array(agent.learner.context, dtype=float), (count, 1))
+        self._state: np.ndarray | None = None
+        self._action = np.zeros(count, int)
+
+    def __call__(self, readings: CrowdReadings) -> np.ndarray:
+        """The motor commands (N, 2) of one tick."""
+        memory, count = self._memory, len(readings.front)
+        memory.see(readings)
+        if self._state is not None:
+            left, right = memory.before
+            gain = np.maximum(*readings.light) - np.maximum(left, right)
+            remembered = self._learner.remember(tuple(self._state.T), self._action, gain)
+            self._context = columns(remembered, count)
+        percept = columns(self._percept.state(readings, memory, self._near), count)
+        self._state = np.concatenate([percept, self._context], axis=1)
+        choice = draw_many(self._learner.values_of(self._state), self._temperature, self._rng.random(count))
+        self._action = np.array(self._percept.actions)[choice]
+        return _MOTORS[self._action]
+
+
+def columns(values: tuple, count: int) -> np.ndarray:
+    """One row for each robot from one array (or number) for each variable."""
+    return np.stack([np.broadcast_to(value, count) for value in values], axis=1) if values else np.empty((count, 0))
+
+
+def draw_many(values: np.ndarray, temperature: float, uniform: np.ndarray) -> np.ndarray:
+    """Equation 2 for each row of values (N, actions)."""
+    weights = np.exp((values - values.max(axis=1, keepdims=True)) / temperature)
+    threshold = uniform * weights.sum(axis=1)
+    return np.minimum((weights.cumsum(axis=1) <= threshold[:, None]).sum(axis=1), values.shape[1] - 1)

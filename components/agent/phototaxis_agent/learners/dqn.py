@@ -1,0 +1,145 @@
+"""A deep Q-network: replay, a target net, and double Q-learning (Mnih et al. 2015; van Hasselt et al. 2016)."""
+
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import torch
+from msgspec import Meta, Struct
+from phototaxis.task import ACTIONS, MIRRORED, Percept, State
+
+from phototaxis_agent import context
+from phototaxis_agent.inputs import OneHot
+from phototaxis_agent.learner import Learner, Transition, falling, stored
+
+torch.set_num_threads(1)  # the nets are too small for more, and one thread always adds in one order
+
+
+class Options(Struct, frozen=True, kw_only=True):
+    """Hyperparameters of the network and its replay."""
+
+    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.8
+    """discount factor γ of equation 1"""
+    rate: Annotated[float, Meta(gt=0, le=1)] = 0.001
+    """learning rate of Adam at the first epoch; it falls geometrically to `rate_end`"""
+    rate_end: Annotated[float, Meta(gt=0, le=1)] = 0.001
+    """learning rate at the end of the budget and after it"""
+    hidden: Annotated[int, Meta(ge=1, le=4096)] = 32
+    """units of the one hidden layer (rectified linear)"""
+    batch: Annotated[int, Meta(ge=1, le=4096)] = 32
+    """experiences that are replayed after each step"""
+    memory: Annotated[int, Meta(ge=1, le=1_000_000)] = 10_000
+    """experiences that are kept; the oldest make room"""
+    sync: Annotated[int, Meta(ge=1)] = 200
+    """steps after which the target net becomes a copy of the net"""
+
+
+class Dqn(Learner):
+    """One net, Q of all actions out; in: the percept one-hot, with the last action and whether it got brighter.
+
+    The mirror image of every experience is learned from as well.
+    """
+
+    Options = Options
+    context: tuple[float, ...] = context.BLANK
+
+    def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
+        self._options, self._percept, self._rng = options, percept, rng
+        self._encode = OneHot((*percept.sizes, *context.SIZES))
+        self._allowed = list(percept.actions)
+        self._net, self._target = (_network(self._encode.width, options.hidden, rng) for _ in range(2))
+        self._target.load_state_dict(self._net.state_dict())
+        self._adam = torch.optim.Adam(self._net.parameters(), options.rate, fused=True)
+        for parameter in self._net.parameters():  # else it comes with the first step, too late for `load`
+            moments = {name: torch.zeros_like(parameter) for name in ("exp_avg", "exp_avg_sq")}
+            self._adam.state[parameter] = {"step": torch.zeros(()), **moments}
+        width, memory = len(percept.sizes) + len(self.context), options.memory
+        self._replay = {
+            "state": np.zeros((memory, width)),
+            "action": np.zeros(memory, np.int64),
+            "reward": np.zeros(memory, np.float32),
+            "following": np.zeros((memory, width)),
+            "terminated": np.zeros(memory, np.float32),
+        }
+        self._kept = 0
+
+    def remember(self, state: Any, action: Any, gain: Any) -> tuple[Any, ...]:
+        return context.remember(action, gain)
+
+    def values_of(self, states: np.ndarray) -> np.ndarray:
+        with torch.no_grad():
+            return self._net(self._encode(states)).numpy()[:, self._allowed]
+
+    def values(self, state: State) -> list[float]:
+        return self.values_of(np.array([state], dtype=float))[0].tolist()
+
+    def learn(self, transition: Transition) -> float:
+        state, action, reward, following, terminated, progress, _ = transition
+        mirror, percept = context.mirror, self._percept
+        self._keep(mirror(percept, state), MIRRORED[action], reward, mirror(percept, following), terminated)
+        newest = self._keep(state, action, reward, following, terminated)
+        kept = min(self._kept, self._options.memory)
+        errors = self._errors(np.array([newest, *self._rng.integers(kept, size=self._options.batch)]))
+        self._adam.param_groups[0]["lr"] = falling(self._options.rate, self._options.rate_end, progress)
+        self._adam.zero_grad()
+        torch.nn.functional.smooth_l1_loss(errors, torch.zeros_like(errors)).backward()
+        self._adam.step()
+        if self._kept // 2 % self._options.sync == 0:
+            self._target.load_state_dict(self._net.state_dict())
+        return errors[0].item()
+
+    def _keep(self, *experience: Any) -> int:
+        """Put an experience in the place of the oldest; its row."""
+        row = self._kept % self._options.memory
+        for column, value in zip(self._replay.values(), experience, strict=True):
+            column[row] = value
+        self._kept += 1
+        return row
+
+    def _errors(self, rows: np.ndarray) -> torch.Tensor:
+        """Q(s, a) less its target, for some experiences; the net chooses what follows, the target net values it."""
+        state, action, reward, following, terminated = (column[rows] for column in self._replay.values())
+        with torch.no_grad():
+            after = self._encode(following)
+            best = self._net(after)[:, self._allowed].argmax(dim=1, keepdim=True)
+            value = self._target(after)[:, self._allowed].gather(1, best)[:, 0]
+            goes_on = 1 - torch.from_numpy(terminated)
+            target = torch.from_numpy(reward) + self._options.gamma * goes_on * value
+        return self._net(self._encode(state)).gather(1, torch.from_numpy(action)[:, None])[:, 0] - target
+
+    def save(self) -> dict[str, np.ndarray]:
+        arrays = {"kept": np.array(self._kept)}
+        kept = min(self._kept, self._options.memory)
+        arrays |= {f"replay {name}": column[:kept].copy() for name, column in self._replay.items()}
+        return arrays | {name: tensor.detach().numpy().copy() for name, tensor in self._tensors().items()}
+
+    def load(self, arrays: dict[str, np.ndarray]) -> None:
+        total = int(stored(arrays, "kept", np.array(0)))
+        kept = min(total, self._options.memory)
+        columns = {n: stored(arrays, f"replay {n}", column[:kept]) for n, column in self._replay.items()}
+        own = self._tensors()
+        tensors = {name: stored(arrays, name, tensor.detach().numpy()) for name, tensor in own.items()}
+        self._kept = total
+        for name, column in columns.items():
+            self._replay[name][:kept] = column
+        with torch.no_grad():
+            for name, tensor in own.items():
+                tensor.copy_(torch.from_numpy(tensors[name]))
+
+    def _tensors(self) -> dict[str, torch.Tensor]:
+        """Weights of both nets and the state of Adam, by name."""
+        named = {f"net {name}": tensor for name, tensor in self._net.state_dict().items()}
+        named |= {f"target {name}": tensor for name, tensor in self._target.state_dict().items()}
+        for name, parameter in self._net.named_parameters():
+            named |= {f"adam {name} {key}": tensor for key, tensor in self._adam.state[parameter].items()}
+        return named
+
+
+def _network(inputs: int, hidden: int, rng: np.random.Generator) -> torch.nn.Sequential:
+    """One hidden layer; first weights uniform in ± 1/√inputs of their layer, as is PyTorch's custom."""
+    network = torch.nn.Sequential(torch.nn.Linear(inputs, hidden), torch.nn.ReLU(), torch.nn.Linear(hidden, len(ACTIONS)))
+    with torch.no_grad():
+        for layer in (network[0], network[2]):
+            for parameter in layer.parameters():
+                bound = layer.in_features**-0.5
+                parameter.copy_(torch.from_numpy(rng.uniform(-bound, bound, tuple(parameter.shape))))
+    return network

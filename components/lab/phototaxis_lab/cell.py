@@ -1,0 +1,115 @@
+"""One cell of an experiment: one agent learns with one seed, is frozen, and is measured."""
+
+from typing import Any
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+from phototaxis.messages import World
+from phototaxis.task import ACTIONS
+from phototaxis_agent.setup import Setup, make_setup
+from phototaxis_sim import arenas
+
+from phototaxis_lab.loop import Loop
+from phototaxis_lab.measure import evaluate
+
+PLACEMENTS = 200
+CURVE = 100
+"""Points of the curve of accumulated reward."""
+
+
+class System(Struct, frozen=True):
+    """An agent in an arena: what is learned and how."""
+
+    learner: str
+    percept: str = "simple"
+    reward: str = "preset"
+    """A reward scheme, or "preset": the one that the learner prefers."""
+    arena: str = "paper"
+    """Name of a shipped arena, or a TOML file."""
+    options: tuple[tuple[str, Any], ...] = ()
+    """Options of the agent, (name, value), where they are not the learner's presets."""
+
+    def setup(self) -> Setup:
+        """The agent's setup; UserError when an option does not fit."""
+        chosen = {} if self.reward == "preset" else {"reward": self.reward}
+        return make_setup(self.learner, percept=self.percept, **chosen, **dict(self.options))
+
+    @classmethod
+    def of(cls, setup: Setup, arena: str) -> "System":
+        """The system of a setup, every option spelt out."""
+        options = msgspec.to_builtins(setup.hyperparameters) | msgspec.to_builtins(setup.exploration)
+        options["cap"] = setup.task.cap
+        return cls(setup.learner, setup.task.percept, setup.task.reward, arena, tuple(options.items()))
+
+    def check(self) -> None:
+        """UserError when there is no such arena, learner or option, or when they do not go together."""
+        self.setup().agent(World("check", arenas.load(self.arena), 0, 1))
+
+    def __str__(self) -> str:
+        words = [self.learner, self.percept, *([self.reward] if self.reward != "preset" else [])]
+        words += [self.arena] if self.arena != "paper" else []
+        return " ".join([*words, *(f"{name}={value}" for name, value in self.options)])
+
+
+class Cell(Struct, frozen=True):
+    """A system, how long it learns, and with which seed."""
+
+    system: System
+    epochs: int
+    seed: int
+
+
+class Outcome(Struct):
+    """What became of a cell."""
+
+    seed: int
+    success_rate: float
+    """Share of 200 fresh placements from which the light was reached within 300 steps."""
+    within_100: float
+    """The same within 100 steps."""
+    steps_mean: float | None
+    path_ratio: float | None
+    learner_hash: str
+    episodes: int
+    """Episodes that ended while learning."""
+    rewards: list[float]
+    """Accumulated reward at 100 equally spaced epochs."""
+    visits: list[int]
+    """How often each state was met while learning; empty where states cannot be counted."""
+    reversals: float
+    """Share of the learning steps that undid the step before: forward after backward, or backward after forward."""
+
+
+def run(cell: Cell) -> Outcome:
+    """Learn, freeze, measure on 200 fresh placements; everything follows from the cell."""
+    arena = arenas.load(cell.system.arena)
+    world = World("lab", arena, cell.seed, cell.epochs)
+    loop = Loop(arena, cell.system.setup().agent(world), cell.seed, cell.epochs)
+    rewards, speeds = np.zeros(cell.epochs), np.zeros(cell.epochs)
+    agent = loop.agent
+    while not loop.simulation.finished:
+        epoch = agent.epoch
+        loop.step()
+        if agent.epoch > epoch:
+            rewards[epoch] = agent.last.reward
+        if agent.last.action >= 0:
+            speeds[min(agent.epoch, cell.epochs - 1)] = sum(ACTIONS[agent.last.action])
+    loop.finish()
+    rewards[-1] = agent.last.reward
+    meta, _ = agent.checkpoint()
+    agent.learning = False
+    found = evaluate(arena, agent, PLACEMENTS, cell.seed)
+    marks = np.linspace(0, cell.epochs, CURVE + 1).astype(int)[1:] - 1
+    return Outcome(
+        seed=cell.seed,
+        success_rate=found.success_rate,
+        within_100=found.within_100,
+        steps_mean=found.steps_mean,
+        path_ratio=found.path_ratio,
+        learner_hash=meta.learner_hash,
+        episodes=loop.simulation.episodes,
+        rewards=np.cumsum(rewards)[marks].round(6).tolist(),
+        visits=meta.visits,
+        reversals=float((speeds[1:] * speeds[:-1] < 0).mean()),
+    )

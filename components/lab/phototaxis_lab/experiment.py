@@ -1,0 +1,97 @@
+"""`phototaxis experiment`: a grid of agents and seeds, in parallel, that can be interrupted."""
+
+import json
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct
+from phototaxis.errors import UserError
+from phototaxis.options import parse
+
+SEEDS = Annotated[str, Meta(pattern=r"^[0-9]+:[0-9]+$")]
+LIST = Annotated[str, Meta(pattern=r"^[^, ]+(,[^, ]+)*$")]
+
+
+class Running(Struct, kw_only=True):
+    """Options of everything that computes many cells."""
+
+    jobs: Annotated[int, Meta(ge=-1, le=10_000)] = -1
+    """processes at a time; -1: one for each core"""
+    backend: Literal["local", "dask"] = "local"
+    """where to compute: this machine, or a Dask cluster whose workers have phototaxis installed"""
+    scheduler: str = ""
+    """address of the Dask scheduler, as in tcp://HOST:8786; trust it: Dask's messages can run code"""
+
+
+class Options(Running, kw_only=True):
+    """Options of `phototaxis experiment`. Lists are separated by commas; all combinations are computed."""
+
+    learners: LIST = "qtable"
+    """names of learners"""
+    percepts: LIST = "simple"
+    """percepts: simple, rich, continuous"""
+    rewards: LIST = "preset"
+    """reward schemes: difference, static, potential; own, the paper's for the percept; preset, the learner's choice"""
+    epochs: LIST = "3000"
+    """numbers of learning steps"""
+    seeds: SEEDS = "0:20"
+    """A:B: the seeds from A to B − 1"""
+    arena: str = "paper"
+    """name of a shipped arena, or a TOML file"""
+    set: list[str] = []
+    """NAME=VALUE: an option of the agent, for all; may be repeated"""
+    out: str = "runs/experiment"
+    """folder of the results; an interrupted experiment continues there"""
+    json: bool = False
+    """print the summary as one JSON object"""
+
+
+def main(argv: Sequence[str]) -> int:
+    about = "Let every combination of learners, percepts, rewards and epochs learn with every seed, and measure each."
+    options = parse(Options, argv, "phototaxis experiment", about)
+    from phototaxis_lab.grid import compute, describe, summarise
+
+    results = compute(cells(options), Path(options.out), options)
+    summaries = summarise(results)
+    if options.json:
+        print(json.dumps({"out": options.out, "systems": summaries}))
+    else:
+        print(describe(summaries))
+    return 0
+
+
+def cells(options: Options) -> list[Any]:
+    """All combinations; each system is tried for what does not fit before anything is computed."""
+    from phototaxis_lab.cell import Cell, System
+
+    given = tuple(_pair(text) for text in options.set)
+    lists = options.learners, options.percepts, options.rewards
+    systems = [System(*names, options.arena, given) for names in product(*(text.split(",") for text in lists))]
+    for system in systems:
+        system.check()
+    epochs = [_steps(text) for text in options.epochs.split(",")]
+    return [Cell(*cell) for cell in product(systems, epochs, seed_range(options.seeds))]
+
+
+def seed_range(text: str) -> range:
+    """The seeds A to B − 1 of A:B; UserError when there are none."""
+    first, _, end = text.partition(":")
+    seeds = range(int(first), int(end))
+    if not seeds:
+        raise UserError(f"--seeds {text}: no seed from {first} to {end}")
+    return seeds
+
+
+def _pair(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise UserError(f"--set {text}: expected NAME=VALUE, as in gamma=0.9")
+    return name.replace("-", "_"), value
+
+
+def _steps(text: str) -> int:
+    if not text.isdecimal() or not int(text):
+        raise UserError(f"--epochs {text}: expected whole numbers above 0, separated by commas")
+    return int(text)

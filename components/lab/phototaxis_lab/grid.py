@@ -1,0 +1,94 @@
+"""Computing many cells, and what they come to."""
+
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from phototaxis.errors import UserError
+from tqdm import tqdm
+
+from phototaxis_lab.cell import Cell, Outcome, System
+from phototaxis_lab.parallel import cluster, outcomes
+from phototaxis_lab.results import Results
+from phototaxis_lab.statistics import mean_interval, median_interval
+
+
+class Running(Protocol):
+    """How to compute: see `experiment.Running`."""
+
+    jobs: int
+    backend: str
+    scheduler: str
+
+
+def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
+    """The outcomes of all cells; those that the folder holds already are not computed again."""
+    results = Results(folder, cells)
+    missing = results.missing
+    if found := len(cells) - len(missing):
+        print(f"{folder}: {found} of {len(cells)} are done already", file=sys.stderr)
+    for place, outcome in watched([cells[index] for index in missing], running):
+        results.add(missing[place], outcome)
+    return results
+
+
+def watched(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int, Outcome]]:
+    """`parallel.outcomes` with a progress bar that counts epochs; without a terminal, a line now and then."""
+    if running.backend == "dask" and not running.scheduler:
+        raise UserError("--backend dask needs the address of a scheduler: --scheduler tcp://HOST:8786")
+    terminal = sys.stderr.isatty()
+    total = sum(cell.epochs for cell in cells)
+    bar = tqdm(total=total, unit=" epochs", unit_scale=True, mininterval=0.1 if terminal else 30.0, disable=not cells)
+    with cluster(running.backend, running.scheduler), bar:
+        for index, outcome in outcomes(cells, running.jobs):
+            yield index, outcome
+            bar.update(cells[index].epochs)
+
+
+def by_system(results: Results) -> dict[tuple[System, int], list[Outcome]]:
+    """The outcomes of each system and number of epochs, in the order of the grid."""
+    found: dict[tuple[System, int], list[Outcome]] = {}
+    for index, cell in enumerate(results.cells):
+        if index in results.done:
+            found.setdefault((cell.system, cell.epochs), []).append(results.done[index])
+    return found
+
+
+def summarise(results: Results) -> list[dict[str, Any]]:
+    """One plain summary for each system and number of epochs."""
+    return [
+        {"system": str(system), "epochs": epochs, **summary(of_seeds)}
+        for (system, epochs), of_seeds in by_system(results).items()
+    ]
+
+
+def summary(of_seeds: Sequence[Outcome]) -> dict[str, Any]:
+    """Success over seeds: median, its 95% interval, worst, mean; path ratio and steps as medians."""
+    rates = [outcome.success_rate for outcome in of_seeds]
+    ratios = [outcome.path_ratio for outcome in of_seeds if outcome.path_ratio is not None]
+    return {
+        "median": float(np.median(rates)),
+        "min": min(rates),
+        "interval": list(median_interval(rates)),
+        "mean": float(np.mean(rates)),
+        "mean_interval": list(mean_interval(rates)),
+        "within_100_min": min(outcome.within_100 for outcome in of_seeds),
+        "path_ratio": float(np.median(ratios)) if ratios else None,
+        "at_least_95_percent": float(np.mean(np.array(rates) >= 0.95)),
+    }
+
+
+def describe(summaries: Sequence[dict[str, Any]]) -> str:
+    """A table in plain text."""
+    width = max(len(one["system"]) for one in summaries)
+    lines = [f"{'':{width}}  {'epochs':>7}  success: median [95% interval]    worst   mean  path ratio"]
+    for one in summaries:
+        low, high = one["interval"]
+        ratio = "" if one["path_ratio"] is None else f"{one['path_ratio']:.1f}"
+        lines.append(
+            f"{one['system']:{width}}  {one['epochs']:7}  {one['median']:15.1%} [{low:.1%}, {high:.1%}]"
+            f"{one['min']:9.1%} {one['mean']:6.1%}  {ratio:>10}"
+        )
+    return "\n".join(lines)

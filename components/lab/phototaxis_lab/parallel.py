@@ -1,0 +1,57 @@
+"""Cells in parallel: over the cores of this machine, or over a Dask cluster."""
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+import joblib
+from phototaxis.errors import Unavailable
+
+from phototaxis_lab.cell import Cell, Outcome, run
+
+PATIENCE = 10.0
+"""Seconds to wait for a Dask scheduler."""
+
+
+def outcomes(cells: Sequence[Cell], jobs: int = -1) -> Iterator[tuple[int, Outcome]]:
+    """The outcome of each cell with its index, as they come. Longest first, so that no core is left alone at the end.
+
+    `jobs` processes at a time, −1 for as many as there are cores; within `cluster`, what the cluster has.
+    """
+    order = sorted(range(len(cells)), key=lambda index: -cells[index].epochs)
+    work = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)
+    yield from work(joblib.delayed(_numbered)(index, cells[index]) for index in order)
+
+
+def _numbered(index: int, cell: Cell) -> tuple[int, Outcome]:
+    return index, run(cell)
+
+
+def cluster(backend: str, scheduler: str) -> AbstractContextManager[Any]:
+    """Where `outcomes` computes: "local", or "dask" with the address of a scheduler.
+
+    Raises
+    ------
+    Unavailable
+        when the scheduler does not answer within 10 s.
+    """
+    return _Dask(scheduler) if backend == "dask" else nullcontext()
+
+
+class _Dask(AbstractContextManager[None]):
+    def __init__(self, scheduler: str):
+        from distributed import Client
+
+        try:
+            self._client = Client(scheduler, timeout=PATIENCE, set_as_default=True)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise Unavailable(f"--scheduler {scheduler}: no Dask scheduler answers there: {error}") from None
+        self._config = joblib.parallel_config(backend="dask")
+
+    def __enter__(self) -> None:
+        self._config.__enter__()
+
+    def __exit__(self, *error: Any) -> None:
+        self._config.__exit__(*error)
+        self._client.close()

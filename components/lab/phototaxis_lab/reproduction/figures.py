@@ -1,0 +1,125 @@
+"""The figures: readable in print, and without colour."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from phototaxis.task import ACTIONS
+
+from phototaxis_lab.cell import CURVE, Outcome
+from phototaxis_lab.statistics import mean_interval
+
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.6,
+    "legend.frameon": False,
+    "figure.dpi": 200,
+    "svg.hashsalt": "phototaxis",
+}
+LOOKS = (
+    ("#0072B2", "o", "-"), ("#D55E00", "s", "--"), ("#009E73", "^", "-."), ("#CC79A7", "D", ":"),
+    ("#E69F00", "v", (0, (5, 1))), ("#56B4E9", "P", (0, (3, 1, 1, 1))), ("#000000", "X", (0, (1, 1))),
+)  # fmt: skip
+"""Okabe and Ito's colours, which the colour-blind can tell apart, each with its own marker and dashes."""
+
+Runs = Mapping[int, Sequence[Outcome]]
+"""The outcomes of one system's seeds, by the number of epochs."""
+
+
+def success(path: Path, systems: Mapping[str, Runs], lines: Mapping[str, float], against: str = "epochs") -> None:
+    """Mean success of each system with its 95% interval, against epochs or ended episodes (figures 10 and 12).
+
+    `lines` are levels to compare with, by what they are.
+    """
+    figure, axes = _figure(5.2, 3.4)
+    for (name, runs), (colour, marker, dashes) in zip(systems.items(), LOOKS, strict=False):
+        rates = [[outcome.success_rate for outcome in outcomes] for outcomes in runs.values()]
+        x = [
+            epochs if against == "epochs" else float(np.mean([outcome.episodes for outcome in outcomes]))
+            for epochs, outcomes in runs.items()
+        ]
+        low, high = np.array([mean_interval(rate) for rate in rates]).T
+        axes.fill_between(x, 100 * low, 100 * high, color=colour, alpha=0.15, linewidth=0)
+        means = [100 * np.mean(rate) for rate in rates]
+        axes.plot(x, means, color=colour, marker=marker, linestyle=dashes, label=name, markersize=5)
+    for name, level in lines.items():
+        axes.axhline(100 * level, color="0.35", linewidth=0.9, linestyle=(0, (2, 2)))
+        axes.annotate(name, (1.0, 100 * level), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
+    axes.set_xscale("log")
+    axes.set_ylim(0, 104)
+    axes.set_xlabel("learning steps (epochs)" if against == "epochs" else "episodes while learning (mean)")
+    axes.set_ylabel("success within 300 steps (%)")
+    axes.xaxis.set_major_formatter(mpl.ticker.FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    _legend_below(axes)
+    _save(figure, path)
+
+
+def accumulated_reward(path: Path, systems: Mapping[str, Sequence[Outcome]], epochs: int) -> None:
+    """Accumulated reward over time: each seed thin, the mean bold (figure 11)."""
+    figure, all_axes = _figure(6.4, 3.0, columns=len(systems))
+    x = np.linspace(epochs / CURVE, epochs, CURVE)
+    for axes, (name, outcomes), (colour, *_) in zip(all_axes, systems.items(), LOOKS, strict=False):
+        curves = np.array([outcome.rewards for outcome in outcomes])
+        axes.plot(x, curves.T, color=colour, alpha=0.3, linewidth=0.6)
+        axes.plot(x, curves.mean(axis=0), color="black", linewidth=1.8)
+        axes.set_title(name, fontsize=9)
+        axes.set_xlabel("learning steps (epochs)")
+        axes.xaxis.set_major_formatter(mpl.ticker.FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    all_axes[0].set_ylabel("accumulated reward (paper's units)")
+    _save(figure, path)
+
+
+def time_in_states(path: Path, shares: np.ndarray, names: Sequence[str]) -> None:
+    """Share of the learning steps spent in each state: mean over seeds and its 95% interval (figure 13).
+
+    `shares` is (seeds, states), in 0..1.
+    """
+    figure, axes = _figure(6.4, 3.0)
+    means = 100 * shares.mean(axis=0)
+    low, high = 100 * np.array([mean_interval(column) for column in shares.T]).T
+    axes.bar(range(len(names)), means, color="#0072B2", width=0.75)
+    axes.errorbar(range(len(names)), means, (means - low, high - means), fmt="none", color="black", linewidth=0.9)
+    axes.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
+    axes.set_xlabel("state (w, x, y, z)")
+    axes.set_ylabel("share of learning steps (%)")
+    axes.grid(visible=False, axis="x")
+    _save(figure, path)
+
+
+def table(path: Path, values: np.ndarray, names: Sequence[str]) -> None:
+    """The learned Q-table, states by actions, the best action of each state marked (figure 6)."""
+    figure, axes = _figure(4.6, 5.4)
+    most = float(np.abs(values).max())
+    image = axes.imshow(values, cmap="PuOr", vmin=-most, vmax=most, aspect="auto")
+    axes.scatter(values.argmax(axis=1), range(len(values)), marker="o", s=14, facecolors="none", edgecolors="black")
+    axes.set_xticks(range(len(ACTIONS)), [f"[{left:.0f},{right:.0f}]" for left, right in ACTIONS], fontsize=7)
+    axes.set_yticks(range(len(names)), names, fontsize=7)
+    axes.set_xlabel("action [left, right]; circles: the best of a state")
+    axes.set_ylabel("state (w, x, y, z)")
+    axes.grid(visible=False)
+    figure.colorbar(image, ax=axes, label="Q (paper's units of reward)", shrink=0.8)
+    _save(figure, path)
+
+
+def _figure(width: float, height: float, columns: int = 1) -> tuple[Figure, Any]:
+    mpl.rcParams.update(STYLE)
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots(1, columns, squeeze=columns == 1)
+
+
+def _legend_below(axes: Axes) -> None:
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2, fontsize=8)
+
+
+def _save(figure: Figure, path: Path) -> None:
+    figure.savefig(path, metadata={"Software": None})

@@ -1,0 +1,79 @@
+"""A folder of results that a killed experiment continues."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+from phototaxis.errors import UserError
+
+from phototaxis_lab.cell import Cell, Outcome
+
+
+class Row(Struct):
+    """A cell and what became of it: one line of `results.jsonl`."""
+
+    cell: Cell
+    outcome: Outcome
+
+
+class Results:
+    """`grid.json`, the cells, and `results.jsonl`, one line for each that is done.
+
+    Parameters
+    ----------
+    folder : made if it does not exist.
+    cells : of the experiment.
+
+    Raises
+    ------
+    UserError
+        when the folder holds the results of other cells, or cannot be written.
+    """
+
+    def __init__(self, folder: Path, cells: Sequence[Cell]):
+        self._path, self.cells = folder / "results.jsonl", list(cells)
+        grid, encoded = folder / "grid.json", msgspec.json.format(msgspec.json.encode(self.cells), indent=0)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if not grid.exists():
+                grid.write_bytes(encoded)
+            elif grid.read_bytes() != encoded:
+                raise UserError(f"{folder}: holds the results of another grid; give another folder, or remove this one")
+            self.done: dict[int, Outcome] = self._read()
+        except OSError as error:
+            raise UserError(f"{folder}: {error.strerror}") from None
+
+    def _read(self) -> dict[int, Outcome]:
+        """What is done, by the index of the cell; a line that a kill left unfinished is dropped."""
+        if not self._path.exists():
+            return {}
+        *whole, rest = self._path.read_bytes().split(b"\n")
+        if rest:
+            with self._path.open("r+b") as file:
+                file.truncate(self._path.stat().st_size - len(rest))
+        known = {_key(cell): index for index, cell in enumerate(self.cells)}
+        rows = [self._row(number, line) for number, line in enumerate(whole, start=1)]
+        return {known[_key(row.cell)]: row.outcome for row in rows}
+
+    def _row(self, number: int, line: bytes) -> Row:
+        try:
+            return msgspec.json.decode(line, type=Row)
+        except msgspec.MsgspecError as error:
+            raise UserError(f"{self._path}, line {number}: {error}; mend it or remove it") from None
+
+    @property
+    def missing(self) -> list[int]:
+        """Indices of the cells that are not done."""
+        return [index for index in range(len(self.cells)) if index not in self.done]
+
+    def add(self, index: int, outcome: Outcome) -> None:
+        """Keep an outcome, at once."""
+        with self._path.open("ab") as file:
+            file.write(msgspec.json.encode(Row(self.cells[index], outcome)) + b"\n")
+        self.done[index] = outcome
+
+
+def _key(cell: Cell) -> Any:
+    return msgspec.json.encode(cell)

@@ -1,0 +1,51 @@
+"""What many seeds say: medians, means, and how sure one may be."""
+
+from collections.abc import Sequence
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+
+CONFIDENCE = 0.95
+RESAMPLES = 10_000
+
+
+class Interval(NamedTuple):
+    """A 95% confidence interval."""
+
+    low: float
+    high: float
+
+
+def median_interval(values: Sequence[float]) -> Interval:
+    """Of the median, from order statistics: whatever the distribution, for outcomes of seeds are bimodal.
+
+    From the r-th lowest to the r-th highest value, r the largest rank that covers at least 95%; with fewer
+    than 6 values none does, and it is the lowest and the highest.
+    """
+    ordered, count = sorted(values), len(values)
+    rank, missed = 1, 2 / 2**count
+    while rank < (count + 1) // 2 and (missed := missed + 2 * comb(count, rank) / 2**count) <= 1 - CONFIDENCE:
+        rank += 1
+    return Interval(ordered[rank - 1], ordered[count - rank])
+
+
+def mean_interval(values: Sequence[float]) -> Interval:
+    """Of the mean, by the percentile bootstrap."""
+    return _percentiles(_means(values, np.random.default_rng(0)))
+
+
+def difference_interval(ours: Sequence[float], theirs: Sequence[float]) -> Interval:
+    """Of the difference of the means of two independent samples, by the percentile bootstrap."""
+    rng = np.random.default_rng(0)
+    return _percentiles(_means(ours, rng) - _means(theirs, rng))
+
+
+def _means(values: Sequence[float], rng: np.random.Generator) -> np.ndarray:
+    return rng.choice(np.asarray(values), (RESAMPLES, len(values))).mean(axis=1)
+
+
+def _percentiles(means: np.ndarray) -> Interval:
+    tail = 50 * (1 - CONFIDENCE)
+    low, high = np.percentile(means, [tail, 100 - tail]).tolist()
+    return Interval(low, high)
