@@ -19,11 +19,8 @@ import msgspec
 import numpy as np
 from phototaxis.arena import Arena, Disc, Light
 from phototaxis.messages import Command, Decoder, Message, Readings, State, World, encode
-from phototaxis.task import TaskOptions
-from phototaxis_agent.exploration import Exploration
 from phototaxis_agent.learner import Transition
-from phototaxis_agent.learners.qtable import Options
-from phototaxis_agent.setup import Setup
+from phototaxis_agent.setup import make_setup
 from phototaxis_lab.loop import Loop, train
 from phototaxis_lab.study import study, summary
 from phototaxis_sensors.light import LightModel
@@ -35,7 +32,7 @@ from phototaxis_sim.physics import Physics, Pose
 ROUNDS = 5
 EPOCHS = 3000
 BUS_EPOCHS = 10_000
-SETUP = Setup("qtable", Options(), TaskOptions(), Exploration())
+SETUP = make_setup()
 
 
 def main() -> None:
@@ -170,7 +167,7 @@ def agent_step(loop: Loop, readings: Readings) -> None:
 def learner_step(loop: Loop) -> None:
     """What the agent asks of its learner in one step."""
     loop.agent.learner.values((0, 0, 0, 0))
-    loop.agent.learner.learn(Transition((0, 0, 0, 0), 3, 0.01, (1, 0, 0, 0), False, 0.5))
+    loop.agent.learner.learn(Transition((0, 0, 0, 0), 3, 0.01, (1, 0, 0, 0), False, 0.5, False))
 
 
 def taking_turns() -> float:

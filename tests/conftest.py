@@ -2,10 +2,7 @@
 
 import pytest
 from phototaxis.arena import Arena
-from phototaxis.task import TaskOptions
-from phototaxis_agent.exploration import Exploration
-from phototaxis_agent.learners.qtable import Options
-from phototaxis_agent.setup import Setup
+from phototaxis_agent.setup import Setup, make_setup
 from phototaxis_sim import arenas
 
 
@@ -18,4 +15,4 @@ def paper() -> Arena:
 @pytest.fixture
 def setup() -> Setup:
     """The default agent: Q-table, simple percept."""
-    return Setup("qtable", Options(), TaskOptions(), Exploration())
+    return make_setup()

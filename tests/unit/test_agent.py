@@ -10,33 +10,33 @@ from phototaxis.arena import Arena
 from phototaxis.checkpoint import load, save
 from phototaxis.errors import UserError
 from phototaxis.messages import World
-from phototaxis.task import PERCEPTS, TaskOptions
+from phototaxis.task import PERCEPTS
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.exploration import Exploration, draw
 from phototaxis_agent.learner import Transition, find
-from phototaxis_agent.learners.qtable import Options, QTable
-from phototaxis_agent.setup import Setup, from_checkpoint
+from phototaxis_agent.learners.qtable import Hyperparameters, QTable
+from phototaxis_agent.setup import Setup, from_checkpoint, make_setup
 from phototaxis_lab.loop import Loop
 
 
 @pytest.mark.parametrize(("percept", "entries"), [("simple", 216), ("rich", 3600)])
 def test_tables_have_the_papers_sizes_and_start(percept, entries):
-    table = QTable(Options(), PERCEPTS[percept], np.random.default_rng(0)).save()["table"]
+    table = QTable(Hyperparameters(), PERCEPTS[percept], np.random.default_rng(0)).save()["table"]
     assert table.size == entries
     assert -0.15 <= table.min() < -0.14
     assert 0.14 < table.max() <= 0.15
 
 
 def test_equation_1():
-    learner = QTable(Options(alpha=0.5, alpha_end=0.1, gamma=0.9), PERCEPTS["simple"], np.random.default_rng(0))
+    learner = QTable(Hyperparameters(alpha=0.5, alpha_end=0.1, gamma=0.9), PERCEPTS["simple"], np.random.default_rng(0))
     state, following = (0, 0, 0, 0), (2, 1, 1, 1)
     table = np.zeros((24, 9))
     table[0, 3], table[23] = 1.0, [0, 0, 4, 0, 0, 0, 0, 0, 0]
     learner.load({"table": table})
-    error = learner.learn(Transition(state, 3, 2.0, following, terminated=False, progress=0))
+    error = learner.learn(Transition(state, 3, 2.0, following, terminated=False, progress=0, first=True))
     assert error == pytest.approx(2 + 0.9 * 4 - 1)
     assert learner.values(state)[3] == pytest.approx(1 + 0.5 * error)
-    learner.learn(Transition(state, 3, 3.0, following, terminated=True, progress=1))
+    learner.learn(Transition(state, 3, 3.0, following, terminated=True, progress=1, first=False))
     assert learner.values(state)[3] == pytest.approx((1 + 0.5 * error) * 0.9 + 0.3)
 
 
@@ -71,7 +71,7 @@ def test_the_agent_learns_from_the_action_that_was_applied(setup: Setup, paper: 
 
 
 def test_episodes_end_at_the_light_and_at_the_cap(paper: Arena):
-    setup = Setup("qtable", Options(), TaskOptions(cap=3), Exploration())
+    setup = make_setup(cap=3)
     agent = setup.agent(World("r", paper, 0, 0))
     ends = [agent(readings(tick, left=1.0, right=1.0, author="a")).end for tick in range(5)]
     assert ends == ["", "", "", "cap", "cap"]
@@ -105,7 +105,7 @@ def file(tmp_path: Path, setup: Setup, paper: Arena) -> Path:
 
 
 def test_a_checkpoint_of_another_percept_is_refused(file: Path, paper: Arena):
-    rich = Setup("qtable", Options(), TaskOptions(percept="rich"), Exploration()).agent(World("r", paper, 0, 10))
+    rich = make_setup(percept="rich").agent(World("r", paper, 0, 10))
     with pytest.raises(UserError, match="of the percept 'simple', but 'rich' is asked for"):
         rich.restore(*load(file), source=str(file))
 
@@ -136,7 +136,7 @@ def test_bad_checkpoints_get_one_line(file: Path, tmp_path: Path):
 
 def test_a_checkpoint_knows_its_setup(file: Path):
     meta, _ = load(file)
-    assert from_checkpoint(meta, "c") == Setup("qtable", Options(), TaskOptions(), Exploration())
+    assert from_checkpoint(meta, "c") == make_setup()
 
 
 def test_an_unknown_learner_lists_those_there_are():

@@ -4,6 +4,7 @@ import math
 
 import pytest
 from making import readings
+from phototaxis.messages import Readings
 from phototaxis.task import ACTIONS, FORWARD, PERCEPTS, Memory, TaskOptions, lit
 
 
@@ -12,6 +13,19 @@ def sonar(**near: float) -> list[float]:
     for group, value in near.items():
         ranges[{"front": 4, "back": 11, "left": 0, "right": 8}[group]] = value
     return ranges
+
+
+def seen(percept: str, senses: Readings, times: int = 1) -> tuple[float, ...]:
+    """The state after as many steps with the same readings."""
+    memory = Memory()
+    for _ in range(times):
+        memory.see(senses)
+    return PERCEPTS[percept].state(senses, memory, 0.4)
+
+
+def unchanged(memory: Memory, light: tuple[float, float]) -> bool:
+    memory.see(readings(light=light))
+    return memory.unchanged
 
 
 def test_state_spaces_have_the_papers_sizes():
@@ -36,7 +50,7 @@ def test_rich_never_moves_backwards():
     ],
 )
 def test_simple_percept(light, ranges, unchanged, state):
-    assert PERCEPTS["simple"].state(readings(light=light, sonar=ranges), unchanged, 0.4) == state
+    assert seen("simple", readings(light=light, sonar=ranges), 5 if unchanged else 1) == state
 
 
 @pytest.mark.parametrize(
@@ -49,16 +63,16 @@ def test_simple_percept(light, ranges, unchanged, state):
     ],
 )
 def test_rich_percept(light, ranges, state):
-    assert PERCEPTS["rich"].state(readings(light=light, sonar=ranges), False, 0.4) == state
+    assert seen("rich", readings(light=light, sonar=ranges)) == state
 
 
 def test_unchanged_needs_five_equal_readings_on_both_sides():
     memory = Memory()
-    assert [memory.unchanged(readings(light=(0.1, 0.1))) for _ in range(5)] == [False] * 4 + [True]
-    assert memory.unchanged(readings(light=(0.109, 0.1)))
-    assert not memory.unchanged(readings(light=(0.109, 0.12)))
+    assert [unchanged(memory, (0.1, 0.1)) for _ in range(5)] == [False] * 4 + [True]
+    assert unchanged(memory, (0.109, 0.1))
+    assert not unchanged(memory, (0.109, 0.12))
     memory.clear()
-    assert not memory.unchanged(readings(light=(0.1, 0.1)))
+    assert not unchanged(memory, (0.1, 0.1))
 
 
 def test_light_is_reached_above_095_on_either_side():

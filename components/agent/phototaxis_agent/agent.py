@@ -118,7 +118,7 @@ class Agent:
         """The number of a percept's state, counted as met; 0 where states are real numbers."""
         if not self.visits:
             return 0
-        number = sum(map(mul, state, self._strides))
+        number = int(sum(map(mul, state, self._strides)))
         self.visits[number] += 1
         return number
 

@@ -58,11 +58,11 @@ class Learner:
         """Take over saved arrays; ValueError when they do not fit."""
         raise NotImplementedError
 
-    def remember(self, state: State, action: int, gain: float) -> tuple[float, ...]:
+    def remember(self, state: Any, action: Any, gain: Any) -> tuple[Any, ...]:
         """The context that goes with the next percept.
 
-        `action` was applied in `state` (−1: none of the nine) and made the brighter reading grow by
-        `gain`. With arrays of shape (N,) instead of numbers it does the same for many robots.
+        `action`, an index into `ACTIONS` (−1: none of the nine), was applied in `state` and made the
+        brighter reading grow by `gain`. With arrays of shape (N,) instead of numbers it does the same for many robots.
         """
         return ()
 

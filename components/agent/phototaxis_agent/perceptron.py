@@ -15,8 +15,8 @@ from phototaxis_agent.learner import stored
 torch.set_num_threads(1)  # nets of this size only lose by more; and one thread always adds in one order
 
 
-class Options(Struct, frozen=True, kw_only=True):
-    """Hyperparameters of a net and of what it learns."""
+class Hyperparameters(Struct, frozen=True, kw_only=True):
+    """Of a net and of what it learns."""
 
     alpha: Annotated[float, Meta(gt=0, le=1)] = 1.0
     """α of equation 1: how far the target lies from the present Q towards r + γ max Q"""
@@ -43,7 +43,9 @@ class Perceptron:
     rng : of the first weights.
     """
 
-    def __init__(self, options: Options, inputs: int, rng: np.random.Generator, *, nets: int = 1, linear: bool = False):
+    def __init__(
+        self, options: Hyperparameters, inputs: int, rng: np.random.Generator, *, nets: int = 1, linear: bool = False
+    ):
         self._options, self._linear = options, linear
         self._shapes = (inputs, options.hidden), (1, options.hidden), (options.hidden, 1), (1, 1)
         size = sum(rows * columns for rows, columns in self._shapes)

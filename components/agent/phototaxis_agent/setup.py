@@ -68,8 +68,8 @@ def make_setup(learner: str = "qtable", **given: Any) -> Setup:
     if unknown := sorted(given.keys() - known):
         raise UserError(f"no option '{unknown[0]}' of the learner {learner}; there are: {', '.join(sorted(known))}")
     values = {**presets(learner, given.get("percept", TaskOptions().percept)), **given}
-    hyperparameters, task, exploration = (convert(struct, values) for struct in structs)
-    return Setup(learner, hyperparameters, task, exploration)
+    own, task, exploration = structs
+    return Setup(learner, convert(own, values), convert(task, values), convert(exploration, values))
 
 
 DEFAULT_BUDGET = 3000

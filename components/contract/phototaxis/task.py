@@ -46,12 +46,20 @@ State = tuple[float, ...]
 class Senses(Protocol):
     """What percepts read: `Readings`, or the same fields with an array wherever one robot has a number."""
 
-    sonar: Any
-    """16 ranges, m."""
-    light: Any
-    """Front left, front right, 0..1."""
-    front: Any
-    rear: Any
+    @property
+    def sonar(self) -> Any:
+        """16 ranges, m."""
+
+    @property
+    def light(self) -> Any:
+        """Front left and front right, 0..1."""
+
+    @property
+    def front(self) -> Any:
+        """Bumpers: contact during the last control period."""
+
+    @property
+    def rear(self) -> Any: ...
 
 
 def lit(senses: Senses) -> bool:

@@ -1,12 +1,13 @@
 """One cell of an experiment: one agent learns with one seed, is frozen, and is measured."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 from msgspec import Struct
 from phototaxis.messages import World
 from phototaxis.task import ACTIONS
+from phototaxis_agent.agent import Agent
 from phototaxis_agent.setup import Setup, make_setup
 from phototaxis_sim import arenas
 
@@ -81,25 +82,42 @@ class Outcome(Struct):
     """Share of the learning steps that undid the step before: forward after backward, or backward after forward."""
 
 
-def run(cell: Cell) -> Outcome:
-    """Learn, freeze, measure on 200 fresh placements; everything follows from the cell."""
+class Learned(NamedTuple):
+    """A cell after its learning."""
+
+    agent: Agent
+    loop: Loop
+    rewards: np.ndarray
+    """Reward of each epoch."""
+    speeds: np.ndarray
+    """Sum of the motor commands of each epoch: whether it went forward or backward."""
+
+
+def learn(cell: Cell) -> Learned:
+    """The agent of a cell, with what it went through."""
     arena = arenas.load(cell.system.arena)
     world = World("lab", arena, cell.seed, cell.epochs)
-    loop = Loop(arena, cell.system.setup().agent(world), cell.seed, cell.epochs)
+    agent = cell.system.setup().agent(world)
+    loop = Loop(arena, agent, cell.seed, cell.epochs)
     rewards, speeds = np.zeros(cell.epochs), np.zeros(cell.epochs)
-    agent = loop.agent
     while not loop.simulation.finished:
         epoch = agent.epoch
-        loop.step()
+        ended = loop.step()
         if agent.epoch > epoch:
             rewards[epoch] = agent.last.reward
-        if agent.last.action >= 0:
-            speeds[min(agent.epoch, cell.epochs - 1)] = sum(ACTIONS[agent.last.action])
+        if ended is None:
+            speeds[loop.simulation.state.epoch - 1] = sum(ACTIONS[agent.last.action])
     loop.finish()
     rewards[-1] = agent.last.reward
+    return Learned(agent, loop, rewards, speeds)
+
+
+def run(cell: Cell) -> Outcome:
+    """Learn, freeze, measure on 200 fresh placements; everything follows from the cell."""
+    agent, loop, rewards, speeds = learn(cell)
     meta, _ = agent.checkpoint()
     agent.learning = False
-    found = evaluate(arena, agent, PLACEMENTS, cell.seed)
+    found = evaluate(loop.simulation.world.arena, agent, PLACEMENTS, cell.seed)
     marks = np.linspace(0, cell.epochs, CURVE + 1).astype(int)[1:] - 1
     return Outcome(
         seed=cell.seed,
@@ -111,5 +129,5 @@ def run(cell: Cell) -> Outcome:
         episodes=loop.simulation.episodes,
         rewards=np.cumsum(rewards)[marks].round(6).tolist(),
         visits=meta.visits,
-        reversals=float((speeds[1:] * speeds[:-1] < 0).mean()),
+        reversals=float((speeds[1:] * speeds[:-1] < 0).mean()) if cell.epochs > 1 else 0.0,
     )

@@ -67,12 +67,12 @@ def cells(options: Options) -> list[Any]:
     from phototaxis_lab.cell import Cell, System
 
     given = tuple(_pair(text) for text in options.set)
-    lists = options.learners, options.percepts, options.rewards
-    systems = [System(*names, options.arena, given) for names in product(*(text.split(",") for text in lists))]
+    lists = options.learners.split(","), options.percepts.split(","), options.rewards.split(",")
+    systems = [System(learner, percept, reward, options.arena, given) for learner, percept, reward in product(*lists)]
     for system in systems:
         system.check()
     epochs = [_steps(text) for text in options.epochs.split(",")]
-    return [Cell(*cell) for cell in product(systems, epochs, seed_range(options.seeds))]
+    return [Cell(*what) for what in product(systems, epochs, seed_range(options.seeds))]
 
 
 def seed_range(text: str) -> range:

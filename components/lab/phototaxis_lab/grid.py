@@ -3,24 +3,17 @@
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from phototaxis.errors import UserError
 from tqdm import tqdm
 
 from phototaxis_lab.cell import Cell, Outcome, System
+from phototaxis_lab.experiment import Running
 from phototaxis_lab.parallel import cluster, outcomes
 from phototaxis_lab.results import Results
 from phototaxis_lab.statistics import mean_interval, median_interval
-
-
-class Running(Protocol):
-    """How to compute: see `experiment.Running`."""
-
-    jobs: int
-    backend: str
-    scheduler: str
 
 
 def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:

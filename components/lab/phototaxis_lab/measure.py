@@ -59,19 +59,17 @@ def direct_steps(arena: Arena, start: Pose) -> float:
 
 def evaluate(arena: Arena, agent: Agent, placements: int, seed: int, cap: int = CAP) -> Evaluation:
     """Place `placements` robots at random, one at a place, and let the frozen agent drive each for `cap` steps."""
-    return measure(arena, lambda count: CrowdAgent(agent, arena.sensing.near, count, seed), placements, seed, cap)
+    return measure(arena, CrowdAgent(agent, arena.sensing.near, placements, seed), placements, seed, cap)
 
 
 Policy = Callable[[CrowdReadings], np.ndarray]
 """From what N robots sense to their motor commands, (N, 2)."""
 
 
-def measure(
-    arena: Arena, policy: Callable[[int], Policy], placements: int, seed: int, cap: int = CAP
-) -> Evaluation:
-    """The same for any policy; `policy` makes one for a number of robots."""
+def measure(arena: Arena, policy: Policy, placements: int, seed: int, cap: int = CAP) -> Evaluation:
+    """The same for any policy."""
     seed += SEED_OFFSET
-    physics, drive = Physics(arena), policy(placements)
+    physics = Physics(arena)
     starts = [physics.random_pose(np.random.default_rng((seed, number))) for number in range(placements)]
     crowd, suite = Crowd(arena, starts), CrowdSuite(World("evaluation", arena, seed, 0))
     steps = np.full(placements, -1)
@@ -80,7 +78,7 @@ def measure(
         steps[(steps < 0) & lit(readings)] = step
         if step == cap or (steps >= 0).all():
             break
-        left, right = np.where(steps < 0, drive(readings).T, 0.0)
+        left, right = np.where(steps < 0, policy(readings).T, 0.0)
         crowd.drive(left, right)
     reached = steps >= 0
     bounds = np.array([direct_steps(arena, start) for start in starts])

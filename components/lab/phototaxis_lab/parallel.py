@@ -1,7 +1,6 @@
 """Cells in parallel: over the cores of this machine, or over a Dask cluster."""
 
-import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -20,7 +19,7 @@ def outcomes(cells: Sequence[Cell], jobs: int = -1) -> Iterator[tuple[int, Outco
     `jobs` processes at a time, −1 for as many as there are cores; within `cluster`, what the cluster has.
     """
     order = sorted(range(len(cells)), key=lambda index: -cells[index].epochs)
-    work = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)
+    work: Any = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
     yield from work(joblib.delayed(_numbered)(index, cells[index]) for index in order)
 
 

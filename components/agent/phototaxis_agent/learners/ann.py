@@ -6,7 +6,7 @@ from phototaxis.task import ACTIONS, Percept, State
 
 from phototaxis_agent.inputs import Scaled
 from phototaxis_agent.learner import Learner, Transition
-from phototaxis_agent.perceptron import Options, Perceptron
+from phototaxis_agent.perceptron import Hyperparameters, Perceptron
 
 REWARDS = (-2.0, 0.0, 2.0, 3.0)
 MAPPED = (0.0, 0.5, 0.75, 1.0)
@@ -16,11 +16,11 @@ MAPPED = (0.0, 0.5, 0.75, 1.0)
 class Ann(Learner):
     """One net for all actions: state and motor command in, Q(state, action) out."""
 
-    Options = Options
+    Options = Hyperparameters
     linear = False
     """Whether the output is linear; then rewards are not mapped."""
 
-    def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
+    def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options, self._percept, self._scaled = options, percept, Scaled(percept)
         motors = (np.array(ACTIONS) + 1) / 2
         self._motors, self._allowed = motors, motors[list(percept.actions)]
@@ -30,7 +30,9 @@ class Ann(Learner):
     def _pairs(self, states: np.ndarray, motors: np.ndarray) -> torch.Tensor:
         """The net's inputs for states (N, variables) and the motor command of each, (1, N, inputs)."""
         width = self._scaled.width
-        return torch.from_numpy(np.concatenate([self._scaled(states[:, :width]), states[:, width:], motors], axis=1))[None]
+        return torch.from_numpy(np.concatenate([self._scaled(states[:, :width]), states[:, width:], motors], axis=1))[
+            None
+        ]
 
     def values_of(self, states: np.ndarray) -> np.ndarray:
         count, actions = len(states), len(self._allowed)

@@ -7,15 +7,15 @@ from phototaxis.task import ACTIONS, Percept, State
 from phototaxis_agent.inputs import Scaled
 from phototaxis_agent.learner import Learner, Transition
 from phototaxis_agent.learners.ann import MAPPED, REWARDS
-from phototaxis_agent.perceptron import Options, Perceptron
+from phototaxis_agent.perceptron import Hyperparameters, Perceptron
 
 
 class AnnPerAction(Learner):
     """Nine nets, 4-4-1 (simple) or 6-4-1 (rich): only the net of the action taken learns."""
 
-    Options = Options
+    Options = Hyperparameters
 
-    def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
+    def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options, self._scaled, self._allowed = options, Scaled(percept), list(percept.actions)
         self._net = Perceptron(options, self._scaled.width, rng, nets=len(ACTIONS))
 

@@ -1,6 +1,6 @@
 """A deep Q-network: replay, a target net, and double Q-learning (Mnih et al. 2015; van Hasselt et al. 2016)."""
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -14,8 +14,8 @@ from phototaxis_agent.learner import Learner, Transition, falling, stored
 torch.set_num_threads(1)  # the nets are too small for more, and one thread always adds in one order
 
 
-class Options(Struct, frozen=True, kw_only=True):
-    """Hyperparameters of the network and its replay."""
+class Hyperparameters(Struct, frozen=True, kw_only=True):
+    """Of the network and its replay."""
 
     gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.8
     """discount factor γ of equation 1"""
@@ -39,10 +39,10 @@ class Dqn(Learner):
     The mirror image of every experience is learned from as well.
     """
 
-    Options = Options
+    Options = Hyperparameters
     context: tuple[float, ...] = context.BLANK
 
-    def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
+    def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options, self._percept, self._rng = options, percept, rng
         self._encode = OneHot((*percept.sizes, *context.SIZES))
         self._allowed = list(percept.actions)
@@ -136,10 +136,10 @@ class Dqn(Learner):
 
 def _network(inputs: int, hidden: int, rng: np.random.Generator) -> torch.nn.Sequential:
     """One hidden layer; first weights uniform in ± 1/√inputs of their layer, as is PyTorch's custom."""
-    network = torch.nn.Sequential(torch.nn.Linear(inputs, hidden), torch.nn.ReLU(), torch.nn.Linear(hidden, len(ACTIONS)))
+    layers = torch.nn.Linear(inputs, hidden), torch.nn.Linear(hidden, len(ACTIONS))
     with torch.no_grad():
-        for layer in (network[0], network[2]):
+        for layer in layers:
             for parameter in layer.parameters():
                 bound = layer.in_features**-0.5
                 parameter.copy_(torch.from_numpy(rng.uniform(-bound, bound, tuple(parameter.shape))))
-    return network
+    return torch.nn.Sequential(layers[0], torch.nn.ReLU(), layers[1])

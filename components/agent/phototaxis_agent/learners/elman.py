@@ -6,7 +6,7 @@ import numpy as np
 from phototaxis.task import Percept
 
 from phototaxis_agent.learners.ann import Ann
-from phototaxis_agent.perceptron import Options
+from phototaxis_agent.perceptron import Hyperparameters
 
 
 class Elman(Ann):
@@ -15,9 +15,9 @@ class Elman(Ann):
     As in Elman's paper the context is an input like any other: errors are not propagated back in time.
     """
 
-    Options = Options
+    Options = Hyperparameters
 
-    def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
+    def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self.context = (0.5,) * options.hidden
         super().__init__(options, percept, rng)
 

@@ -20,8 +20,8 @@ FORGOTTEN = 0.01
 """A trace that has decayed below this is dropped."""
 
 
-class Options(Struct, frozen=True, kw_only=True):
-    """Hyperparameters of the folded table."""
+class Hyperparameters(Struct, frozen=True, kw_only=True):
+    """Of the folded table."""
 
     alpha: Annotated[float, Meta(gt=0, le=1)] = 0.35
     """learning rate at the first epoch; it falls geometrically to `alpha_end`"""
@@ -41,9 +41,9 @@ class Options(Struct, frozen=True, kw_only=True):
 class Mirror(Learner):
     """Entries of states and actions, each shared with its mirror image."""
 
-    Options = Options
+    Options = Hyperparameters
 
-    def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
+    def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options = options
         sizes = discrete(percept, "mirror").sizes
         if options.memory == "last":

@@ -13,8 +13,8 @@ FORGOTTEN = 0.01
 """A trace that has decayed below this is dropped."""
 
 
-class Options(qtable.Options, frozen=True, kw_only=True):
-    """Hyperparameters of the table and its traces."""
+class Hyperparameters(qtable.Hyperparameters, frozen=True, kw_only=True):
+    """Of the table and its traces."""
 
     decay: Annotated[float, Meta(ge=0, le=1)] = 0.8
     """trace decay λ: 0 is plain Q-learning; 1 corrects the whole way that led here"""
@@ -26,9 +26,9 @@ class QLambda(qtable.QTable):
     Traces replace each other and are cut where an action was not the best one known.
     """
 
-    Options = Options
+    Options = Hyperparameters
 
-    def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
+    def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         super().__init__(options, percept, rng)
         self._decay = options.decay
         self._traces: dict[tuple[int, int], float] = {}

@@ -10,8 +10,8 @@ from phototaxis.task import ACTIONS, Percept, State
 from phototaxis_agent.learner import Learner, Transition, discrete, falling, stored
 
 
-class Options(Struct, frozen=True, kw_only=True):
-    """Hyperparameters of the table."""
+class Hyperparameters(Struct, frozen=True, kw_only=True):
+    """Of the table."""
 
     alpha: Annotated[float, Meta(gt=0, le=1)] = 0.16
     """learning rate α of equation 1 at the first epoch; it falls geometrically to `alpha_end`"""
@@ -24,11 +24,13 @@ class Options(Struct, frozen=True, kw_only=True):
 class QTable(Learner):
     """One entry for each state and action: 24·9 = 216 (simple) or 400·9 = 3,600 (rich)."""
 
-    Options = Options
+    Options = Hyperparameters
 
-    def __init__(self, options: Options, percept: Percept, rng: np.random.Generator):
+    def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options = options
-        self._index = {state: i for i, state in enumerate(product(*map(range, discrete(percept, "qtable").sizes)))}
+        self._index: dict[State, int] = {
+            state: i for i, state in enumerate(product(*map(range, discrete(percept, "qtable").sizes)))
+        }
         self._allowed = percept.actions
         shape = len(self._index), len(ACTIONS)
         self._table: list[list[float]] = rng.uniform(-0.15, 0.15, shape).tolist()  # section 5.1, step 1

@@ -8,12 +8,13 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import StrMethodFormatter
 from phototaxis.task import ACTIONS
 
 from phototaxis_lab.cell import CURVE, Outcome
 from phototaxis_lab.statistics import mean_interval
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
     "axes.spines.top": False,
@@ -59,7 +60,7 @@ def success(path: Path, systems: Mapping[str, Runs], lines: Mapping[str, float],
     axes.set_ylim(0, 104)
     axes.set_xlabel("learning steps (epochs)" if against == "epochs" else "episodes while learning (mean)")
     axes.set_ylabel("success within 300 steps (%)")
-    axes.xaxis.set_major_formatter(mpl.ticker.FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
     _legend_below(axes)
     _save(figure, path)
 
@@ -74,7 +75,7 @@ def accumulated_reward(path: Path, systems: Mapping[str, Sequence[Outcome]], epo
         axes.plot(x, curves.mean(axis=0), color="black", linewidth=1.8)
         axes.set_title(name, fontsize=9)
         axes.set_xlabel("learning steps (epochs)")
-        axes.xaxis.set_major_formatter(mpl.ticker.FuncFormatter(lambda value, _: f"{value:,.0f}"))
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
     all_axes[0].set_ylabel("accumulated reward (paper's units)")
     _save(figure, path)
 

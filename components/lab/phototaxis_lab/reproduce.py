@@ -1,0 +1,42 @@
+"""`phototaxis reproduce`: the paper's experiments, as a page of claims, measurements and figures."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from phototaxis.errors import UserError
+from phototaxis.options import parse
+
+from phototaxis_lab.experiment import SEEDS, Running, seed_range
+
+
+class Options(Running, kw_only=True):
+    """Options of `phototaxis reproduce`."""
+
+    seeds: SEEDS = "0:20"
+    """A:B: the seeds from A to B − 1"""
+    results: str = "runs/reproduction"
+    """folder of the results; an interrupted reproduction continues there"""
+    out: str = "docs/reproduction"
+    """folder that the page and its figures are written to"""
+
+
+def main(argv: Sequence[str]) -> int:
+    about = "Run the paper's experiments and those beyond it, and write the page that says what became of its claims."
+    options = parse(Options, argv, "phototaxis reproduce", about)
+    seeds, out = seed_range(options.seeds), Path(options.out)
+    from phototaxis_lab.grid import by_system, compute
+    from phototaxis_lab.reproduction import page, plan
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {out}: {error.strerror}") from None
+    found = by_system(compute(plan.cells(seeds), Path(options.results), options))
+    data = {
+        name: {epochs: found[system, epochs] for epochs in budgets} for name, (system, budgets) in plan.WHOLE.items()
+    }
+    print("writing the page", file=sys.stderr)
+    page.write(out, data, seeds)
+    print(out / "README.md")
+    return 0
