@@ -5,7 +5,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from phototaxis.errors import UserError
-from phototaxis.task import Percept, State
+from phototaxis.task import PERCEPTS, Percept, State
 
 GROUP = "phototaxis.learners"
 
@@ -72,7 +72,7 @@ class Learner:
         return np.array([self.values(tuple(row)) for row in rows.tolist()])[which.reshape(-1)]
 
 
-def discrete(percept: Percept, learner: str) -> Percept:
+def discrete(percept: Percept) -> Percept:
     """The percept, if its states can be counted; for learners that keep a table.
 
     Raises
@@ -81,7 +81,8 @@ def discrete(percept: Percept, learner: str) -> Percept:
         when they cannot.
     """
     if not all(percept.sizes):
-        raise UserError(f"--learner {learner}: needs a percept whose states can be counted, not '{percept.name}'")
+        countable = ", ".join(name for name, one in PERCEPTS.items() if all(one.sizes))
+        raise UserError(f"--percept {percept.name}: this learner keeps a table and needs countable states: {countable}")
     return percept
 
 

@@ -255,7 +255,7 @@ class Reward(Struct, frozen=True):
 REWARDS: dict[str, Reward] = {
     "difference": Reward("difference"),
     "static": Reward("static"),
-    "potential": Reward("potential", collision=-2.0, unchanged=-1.0),
+    "potential": Reward("potential", goal=2.0, collision=-2.0, unchanged=-0.35),
 }
 
 OWN_REWARD: dict[str, Scheme] = {"simple": "difference", "rich": "static", "continuous": "potential"}

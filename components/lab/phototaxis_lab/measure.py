@@ -59,6 +59,8 @@ def direct_steps(arena: Arena, start: Pose) -> float:
 
 def evaluate(arena: Arena, agent: Agent, placements: int, seed: int, cap: int = CAP) -> Evaluation:
     """Place `placements` robots at random, one at a place, and let the frozen agent drive each for `cap` steps."""
+    if agent.learning:
+        raise ValueError("an agent that is evaluated must not learn")
     return measure(arena, CrowdAgent(agent, arena.sensing.near, placements, seed), placements, seed, cap)
 
 

@@ -39,6 +39,7 @@ class Crowd:
         self._mass, self._moment = bodies[0].mass, bodies[0].moment
         self._ids = np.array([body.id for body in bodies], np.uintp)
         self._order = np.argsort(self._ids)
+        self._seen, self._felt, self._told = Buffer(), Buffer(), Buffer()  # pymunk frees none: made once, used again
         self.poses = np.array(poses, dtype=float)
         self.front = self.rear = np.zeros(self._count, bool)
 
@@ -83,21 +84,20 @@ class Crowd:
         self.poses = poses
 
     def _set(self, fields: BodyFields, rows: np.ndarray) -> None:
-        buffer = Buffer()
-        buffer.set_float_buf(rows)
-        set_space_bodies(self._space, fields, buffer)
+        self._told.set_float_buf(rows)
+        set_space_bodies(self._space, fields, self._told)
 
     def _get_poses(self) -> np.ndarray:
-        buffer = Buffer()
-        get_space_bodies(self._space, _POSE, buffer)
-        return np.frombuffer(buffer.float_buf()).reshape(-1, 3)[: self._count].copy()
+        self._seen.clear()
+        get_space_bodies(self._space, _POSE, self._seen)
+        return np.frombuffer(self._seen.float_buf()).reshape(-1, 3)[: self._count].copy()
 
     def _feel(self, poses: np.ndarray) -> None:
         """Note who was stopped, in front or at the rear, in the last physics step."""
-        buffer = Buffer()
-        get_space_arbiters(self._space, _TOUCH, buffer)
-        ids = np.frombuffer(buffer.int_buf(), np.uintp).reshape(-1, 3)
-        floats = np.frombuffer(buffer.float_buf()).reshape(-1, 6)
+        self._felt.clear()
+        get_space_arbiters(self._space, _TOUCH, self._felt)
+        ids = np.frombuffer(self._felt.int_buf(), np.uintp).reshape(-1, 3)
+        floats = np.frombuffer(self._felt.float_buf()).reshape(-1, 6)
         pressed = (ids[:, 2] > 0) & floats[:, :2].any(axis=1)
         if not pressed.any():
             return

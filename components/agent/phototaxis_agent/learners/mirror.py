@@ -1,20 +1,20 @@
-"""The learner that needs the fewest steps: SARSA(λ) on a table folded along the robot's symmetry.
+"""The learner that needs the fewest steps: least-squares SARSA(λ) on a table folded along the robot's symmetry.
 
-Three ideas. Left and right are alike, so a state and action share their entry with their mirror image, and
-every experience counts twice. Traces (Sutton and Barto, section 12.7) hand an error back to the steps that
-led to it, which also softens that percepts are not Markov states. And the reward scheme "potential" pays for
-approach alone. Where the percept tells too little, the last action and its effect are added to it.
+Left and right are alike: a state and action share their entry with their mirror image, so every experience
+counts twice. And instead of creeping towards each target by a learning rate, the table is at every step the
+exact solution of all that was experienced so far: the recursive least squares of Xu, He and Hu (2002) after
+Bradtke and Barto (1996), with eligibility traces, which soften that percepts are not Markov states. The
+reward scheme "potential" pays for approach alone.
 """
 
-from itertools import product
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
 from phototaxis.task import ACTIONS, MIRRORED, Percept, State
 
 from phototaxis_agent import context
-from phototaxis_agent.learner import Learner, Transition, discrete, falling, stored, stored_rows
+from phototaxis_agent.learner import Learner, Transition, discrete, stored, stored_rows
 
 FORGOTTEN = 0.01
 """A trace that has decayed below this is dropped."""
@@ -23,36 +23,40 @@ FORGOTTEN = 0.01
 class Hyperparameters(Struct, frozen=True, kw_only=True):
     """Of the folded table."""
 
-    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.35
-    """learning rate at the first epoch; it falls geometrically to `alpha_end`"""
-    alpha_end: Annotated[float, Meta(gt=0, le=1)] = 0.1
-    """learning rate at the end of the budget and after it"""
-    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.5
+    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.8
     """discount factor γ of equation 1"""
-    decay: Annotated[float, Meta(ge=0, le=1)] = 0.5
-    """trace decay λ: 0 corrects the last step alone, 1 the whole way that led here"""
-    start: Annotated[float, Meta(ge=-100, le=100)] = 0.0
-    """value of every entry at the beginning; optimism makes the robot try everything"""
-    count: Literal["no", "yes"] = "no"
-    memory: Literal["none", "last"] = "none"
+    decay: Annotated[float, Meta(ge=0, le=1)] = 0.8
+    """trace decay λ: 0 fits each step to the next, 1 to all that followed"""
+    start: Annotated[float, Meta(ge=-100, le=100)] = 0.3
+    """value of an entry without experience; optimism makes the robot try everything"""
+    ridge: Annotated[float, Meta(gt=0, le=1000)] = 0.5
+    """how many experiences the first value counts for"""
+    memory: Literal["none", "last"] = "last"
     """none: the percept alone is the state; last: also the last action and whether it got brighter"""
 
 
+_UNKNOWN = [0] * len(ACTIONS)
+
+
 class Mirror(Learner):
-    """Entries of states and actions, each shared with its mirror image."""
+    """Entries of states and actions that were tried, each shared with its mirror image."""
 
     Options = Hyperparameters
+    presets: ClassVar[dict[str, dict[str, Any]]] = {
+        "": {"reward": "potential", "hot": 0.12, "cold": 0.06, "cooling": 0.6, "cap": 200},
+        "rich": {"cap": 100, "cold": 0.08, "start": 0.7, "ridge": 3.0},
+    }
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
-        self._options = options
-        sizes = discrete(percept, "mirror").sizes
+        self._options, self._percept, self._allowed = options, discrete(percept), list(percept.actions)
         if options.memory == "last":
-            sizes, self.context = (*sizes, *context.SIZES), context.BLANK
-        self._entries, count = _fold(percept, sizes, bool(self.context))
-        self._rows = {state: [entries[a] for a in percept.actions] for state, entries in self._entries.items()}
-        self._table = [options.start] * count
-        self._visits = [0] * count
-
+            self.context = context.BLANK
+        self._entries: dict[State, list[int]] = {}
+        self._met: list[tuple[float, ...]] = []
+        self._table = np.array([options.start])
+        """Entry 0 stands for everything that was not tried yet."""
+        self._spread = np.zeros((1, 1))
+        """How far an error at one entry moves the others: the inverse of the least squares' matrix."""
         self._traces: dict[int, float] = {}
         self._open: tuple[float, ...] = ()
         """The last step, until the next one says what followed: entry, reward, the state it led to."""
@@ -61,62 +65,80 @@ class Mirror(Learner):
         return context.remember(action, gain) if self.context else ()
 
     def values(self, state: State) -> list[float]:
-        table = self._table
-        return [table[entry] for entry in self._rows[state]]
+        table, entries = self._table, self._entries.get(state, _UNKNOWN)
+        return [float(table[entries[action]]) for action in self._allowed]
 
     def learn(self, transition: Transition) -> float:
-        """Correct the step before this one, now that the action that followed it is known."""
-        state, action, reward, following, terminated, progress, first = transition
-        rate, error = falling(self._options.alpha, self._options.alpha_end, progress), 0.0
-        entry = self._entries[state][action]
+        """Fit the step before this one, now that the action that followed it is known."""
+        state, action, reward, following, terminated, _, first = transition
+        entry, error = self._entry(state, action), 0.0
         if self._open:
             last, last_reward, *reached = self._open
-            after = max(self.values(tuple(reached))) if first else self._table[entry]
-            error = self._correct(int(last), last_reward + self._options.gamma * after, rate)
+            error = self._fit(int(last), last_reward, self._best(tuple(reached)) if first else entry)
         if first:
             self._traces.clear()
         self._open = (entry, reward, *following)
         if terminated:
-            error = self._correct(entry, reward, rate)
+            error = self._fit(entry, reward, None)
             self._open = ()
             self._traces.clear()
         return error
 
-    def _correct(self, entry: int, target: float, rate: float) -> float:
-        """Move an entry and what led to it towards a target; the error before."""
-        fade = self._options.gamma * self._options.decay
+    def _fit(self, entry: int, reward: float, following: int | None) -> float:
+        """Let the table fit one more equation, Q(entry) = reward + γ Q(following), exactly; the error before."""
+        gamma, size = self._options.gamma, len(self._met) + 1
+        table, spread = self._table[:size], self._spread[:size, :size]
+        fade = gamma * self._options.decay
         self._traces = {one: fade * trace for one, trace in self._traces.items() if fade * trace > FORGOTTEN}
-        self._traces[entry] = 1.0
-        error = target - self._table[entry]
-        self._visits[entry] += 1
-        if self._options.count == "yes":
-            for one, trace in self._traces.items():
-                self._table[one] += max(rate, 1 / (1 + self._visits[one])) * trace * error
-        else:
-            for one, trace in self._traces.items():
-                self._table[one] += rate * trace * error
-        return error
+        self._traces[entry] = self._traces.get(entry, 0.0) + 1.0
+        gain = sum(trace * spread[:, one] for one, trace in self._traces.items())
+        error, slope, scale = reward - table[entry], spread[entry], 1 + gain[entry]
+        if following is not None:
+            error, slope = error + gamma * table[following], slope - gamma * spread[following]
+            scale -= gamma * gain[following]
+        gain /= scale
+        table += error * gain
+        spread -= np.multiply.outer(gain, slope)
+        return float(error)
+
+    def _best(self, state: State) -> int:
+        """The entry of the best allowed action."""
+        entries = self._entries.get(state, _UNKNOWN)
+        return max((entries[action] for action in self._allowed), key=self._table.__getitem__)
+
+    def _entry(self, state: State, action: int) -> int:
+        """The entry of an action in a state, also that of their mirror image; made when it is first asked for."""
+        entries = self._entries.setdefault(state, [0] * len(ACTIONS))
+        if not entries[action]:
+            image = context.mirror(self._percept, state) if self.context else self._percept.mirror(state)
+            self._met.append((*state, action))
+            number = len(self._met)
+            if number == len(self._table):
+                self._table = np.append(self._table, np.full(number, self._options.start))
+                self._spread = np.pad(self._spread, (0, number))
+            self._spread[number, number] = 1 / self._options.ridge
+            entries[action] = self._entries.setdefault(image, [0] * len(ACTIONS))[MIRRORED[action]] = number
+        return entries[action]
 
     def save(self) -> dict[str, np.ndarray]:
-        traces = np.array(list(self._traces.items()), dtype=float).reshape(-1, 2)
-        return {"table": np.array(self._table), "traces": traces, "open": np.array(self._open, dtype=float)}
+        width, size = len(self._percept.sizes) + len(self.context) + 1, len(self._met) + 1
+        return {
+            "met": np.array(self._met, dtype=float).reshape(-1, width),
+            "table": self._table[:size].copy(),
+            "spread": self._spread[:size, :size].copy(),
+            "traces": np.array(list(self._traces.items()), dtype=float).reshape(-1, 2),
+            "open": np.array(self._open, dtype=float),
+        }
 
     def load(self, arrays: dict[str, np.ndarray]) -> None:
-        table, traces = stored(arrays, "table", np.array(self._table)), stored_rows(arrays, "traces", 2)
+        fresh = Mirror(self._options, self._percept, np.random.default_rng())
+        for *state, action in stored_rows(arrays, "met", len(self._percept.sizes) + len(self.context) + 1).tolist():
+            fresh._entry(tuple(state), int(action))
+        like = fresh.save()
+        table, spread = (stored(arrays, name, like[name]) for name in ("table", "spread"))
+        traces = stored_rows(arrays, "traces", 2)
         unfinished = stored(arrays, "open", np.zeros(len(arrays.get("open", ()))))
-        self._table, self._open = table.tolist(), tuple(unfinished.tolist())
+        fresh._table[: len(table)], fresh._spread[: len(table), : len(table)] = table, spread
+        self._entries, self._met, self._table, self._spread = fresh._entries, fresh._met, fresh._table, fresh._spread
         self._traces = {int(entry): trace for entry, trace in traces.tolist()}
-
-
-def _fold(percept: Percept, sizes: tuple[int, ...], remembers: bool) -> tuple[dict[State, list[int]], int]:
-    """The entry of each action in each state, mirror images sharing one; and how many entries there are."""
-    entries: dict[tuple[State, int], int] = {}
-    count = 0
-    states = list(product(*map(range, sizes)))
-    for state in states:
-        image = context.mirror(percept, state) if remembers else percept.mirror(state)
-        for action in range(len(ACTIONS)):
-            if (state, action) not in entries:
-                entries[state, action] = entries[image, MIRRORED[action]] = count
-                count += 1
-    return {state: [entries[state, action] for action in range(len(ACTIONS))] for state in states}, count
+        self._open = tuple(unfinished.tolist())

@@ -29,7 +29,7 @@ class QTable(Learner):
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options = options
         self._index: dict[State, int] = {
-            state: i for i, state in enumerate(product(*map(range, discrete(percept, "qtable").sizes)))
+            state: i for i, state in enumerate(product(*map(range, discrete(percept).sizes)))
         }
         self._allowed = percept.actions
         shape = len(self._index), len(ACTIONS)
