@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,15 @@ import msgspec
 import numpy as np
 from phototaxis.arena import Arena, Disc, Light
 from phototaxis.messages import Command, Decoder, Message, Readings, State, World, encode
-from phototaxis_agent.learner import Transition
+from phototaxis.task import PERCEPTS
+from phototaxis_agent.crowd import CrowdAgent
+from phototaxis_agent.learner import Transition, available
 from phototaxis_agent.setup import make_setup
+from phototaxis_lab.cell import Cell, System
+from phototaxis_lab.grid import summary
 from phototaxis_lab.loop import Loop, train
-from phototaxis_lab.study import study, summary
+from phototaxis_lab.measure import measure
+from phototaxis_lab.parallel import outcomes
 from phototaxis_sensors.light import LightModel
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.sonar import SonarModel
@@ -61,13 +67,51 @@ def main() -> None:
         print(f"  {name:60} {ratio:5.2f}")
 
     print("\nLearning: Q-table, simple percept, 3,000 epochs, seeds 0 to 19, 200 fresh placements each")
-    for name, value in summary(list(study(SETUP, paper, 3000, range(20)))).items():
-        print(f"  {name:60} {value:5.3f}")
+    found = [outcome for _, outcome in outcomes([Cell(System("qtable"), 3000, seed) for seed in range(20)])]
+    for name, value in summary(found).items():
+        print(f"  {name:60} {value}")
+
+    print("\nTraining in one process, steps/s: median of", ROUNDS, "rounds, and the learner's own share of a step, µs")
+    for name, rate, own in learners(paper):
+        print(f"  {name:25} {rate:9,.0f} {own:9.1f}")
+
+    print("\nMany robots in one process (evaluations), robot steps/s: physics, sensors, percept, a table's draws")
+    for count, rate in crowds(paper):
+        print(f"  {count:5} robots {rate:12,.0f}")
 
     print("\nCost of one tick by part, in one process, µs")
     bus = 1e6 / rates["four processes with recorder, ticks/s"] - 1e6 / rates["in-process, epochs/s"]
     for name, cost in {**parts(paper), "bus: a tick over it less a step in one process": bus}.items():
         print(f"  {name:65} {cost:7.1f}")
+
+
+def learners(arena: Arena) -> list[tuple[str, float, float]]:
+    """Each learner with each percept that suits it: training steps/s, and µs of one `values` and one `learn`."""
+    rows = []
+    every = [(name, percept) for name in available() for percept in ("simple", "rich")] + [("dqn", "continuous")]
+    for name, percept in every:
+        setup = make_setup(name, percept=percept)
+        rate = statistics.median(1000 / train(setup, arena, number, 1000)[1] for number in range(ROUNDS))
+        learner = setup.agent(World("bench", arena, 1, 0)).learner
+        state = tuple(0 * size for size in PERCEPTS[percept].sizes) + learner.context
+        step = Transition(state, 3, 0.01, state, False, 0.5, False)
+        own = cost(partial(learner.values, state), 300) + cost(partial(learner.learn, step), 300)
+        rows.append((f"{name}, {percept}", rate, own))
+    return rows
+
+
+def crowds(arena: Arena) -> list[tuple[int, float]]:
+    """Robot steps/s of evaluations with different numbers of robots."""
+    agent = SETUP.agent(World("bench", arena, 1, 0), learning=False)
+    rows = []
+    for count in (1, 16, 256, 4096):
+        rates = []
+        for number in range(ROUNDS):
+            began = time.perf_counter()
+            found = measure(arena, CrowdAgent(agent, arena.sensing.near, count, number), count, number, cap=30)
+            rates.append(30 * found.placements / (time.perf_counter() - began))
+        rows.append((count, statistics.median(rates)))
+    return rows
 
 
 def ratios(rounds: list[dict[str, float]]) -> dict[str, float]:

@@ -79,7 +79,9 @@ def test_damaged_results_are_named_by_their_line(tmp_path: Path):
 
 
 def test_a_grid_is_every_combination():
-    found = cells(Options(learners="qtable,ann", percepts="simple,rich", epochs="10,20", seeds="3:6", set=["gamma=0.4"]))
+    found = cells(
+        Options(learners="qtable,ann", percepts="simple,rich", epochs="10,20", seeds="3:6", set=["gamma=0.4"])
+    )
     assert len(found) == len(set(found)) == 2 * 2 * 2 * 3
     assert {cell.system.setup().hyperparameters.gamma for cell in found} == {0.4}
 
@@ -89,7 +91,10 @@ def test_a_grid_is_every_combination():
     [
         (["--learners", "qtabel"], "no learner 'qtabel'; there are: ann, .*qtable"),
         (["--percepts", "richer"], r"--percept richer: .*"),
-        (["--learners", "mirror", "--percepts", "continuous"], "--percept continuous: .*countable states: simple, rich"),
+        (
+            ["--learners", "mirror", "--percepts", "continuous"],
+            "--percept continuous: .*countable states: simple, rich",
+        ),
         (["--rewards", "gold"], "--reward gold: .*"),
         (["--epochs", "300,0"], "--epochs 0: expected whole numbers above 0"),
         (["--seeds", "4:4"], "--seeds 4:4: no seed from 4 to 4"),
@@ -115,7 +120,18 @@ def test_seeds_are_half_open():
 
 
 def test_an_experiment_in_one_process(tmp_path: Path, capsys):
-    words = ["--learners", "qtable,mirror", "--epochs", "50,80", "--seeds", "0:2", "--out", str(tmp_path), "--jobs", "1"]
+    words = [
+        "--learners",
+        "qtable,mirror",
+        "--epochs",
+        "50,80",
+        "--seeds",
+        "0:2",
+        "--out",
+        str(tmp_path),
+        "--jobs",
+        "1",
+    ]
     assert main([*words, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["systems"]
     assert [(one["system"], one["epochs"]) for one in found] == [

@@ -4,7 +4,7 @@ The nets are so small that the price of a call decides: autograd would cost four
 closed form, which for one hidden layer is four lines.
 """
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -30,6 +30,13 @@ class Hyperparameters(Struct, frozen=True, kw_only=True):
     """hidden units"""
     spread: Annotated[float, Meta(gt=0, le=10)] = 0.1
     """weights and biases begin uniform in ± this (conx: 0.1)"""
+
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "": {"gamma": 0.9, "hot": 0.03, "cold": 0.01, "rate": 0.3},
+    "rich": {"gamma": 0.3, "hot": 0.1, "cold": 0.02, "rate": 0.1, "cap": 300},
+}
+"""What was best for the paper's net; the other nets take the same, so that they can be compared with it."""
 
 
 class Perceptron:

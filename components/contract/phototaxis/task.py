@@ -172,17 +172,18 @@ class Rich:
 
 
 class Continuous:
-    """Beyond the paper: eleven real numbers, and no reverse.
+    """Beyond the paper: twelve real numbers, and no reverse.
 
     The square root of each light (for the paper's light law 1 / distance); their contrast
     (left − right) / (left + right); the relative change of each since the last step; how near the front,
-    back, left and right sonar groups are, from 0 at 1 m to 1 at 0 m; the two bumpers.
+    back, left and right sonar groups are, from 0 at 1 m to 1 at 0 m; the two bumpers;
+    and whether the light is unchanged for 5 steps.
     """
 
     name = "continuous"
     variables: tuple[str, ...] = (
         "left", "right", "contrast", "left change", "right change",
-        "near front", "near back", "near left", "near right", "front bumper", "rear bumper",
+        "near front", "near back", "near left", "near right", "front bumper", "rear bumper", "unchanged",
     )  # fmt: skip
     sizes: tuple[int, ...] = (0,) * len(variables)
     actions: tuple[int, ...] = FORWARD
@@ -194,7 +195,7 @@ class Continuous:
         )
         return (
             left**0.5, right**0.5, _contrast(left, right), _contrast(left, left_before), _contrast(right, right_before),
-            near_front, near_back, near_left, near_right, 1.0 * senses.front, 1.0 * senses.rear,
+            near_front, near_back, near_left, near_right, 1.0 * senses.front, 1.0 * senses.rear, 1.0 * memory.unchanged,
         )  # fmt: skip
 
     def mirror(self, state: State) -> State:
@@ -255,7 +256,7 @@ class Reward(Struct, frozen=True):
 REWARDS: dict[str, Reward] = {
     "difference": Reward("difference"),
     "static": Reward("static"),
-    "potential": Reward("potential", goal=2.0, collision=-2.0, unchanged=-0.35),
+    "potential": Reward("potential", goal=3.0, collision=-1.0, unchanged=-0.5),
 }
 
 OWN_REWARD: dict[str, Scheme] = {"simple": "difference", "rich": "static", "continuous": "potential"}
@@ -266,7 +267,7 @@ class TaskOptions(Struct, kw_only=True):
     """What is to be learned."""
 
     percept: Literal["simple", "rich", "continuous"] = "simple"
-    """what the learner sees: 24 states, 400 states (both the paper's), or 11 real numbers"""
+    """what the learner sees: 24 states, 400 states (both the paper's), or 12 real numbers"""
     reward: Literal["own", "difference", "static", "potential"] = "own"
     """reward scheme; own: the percept's (simple: difference, rich: static, continuous: potential)"""
     cap: Annotated[int, Meta(ge=1)] = 100

@@ -1,6 +1,7 @@
 """Computing many cells, and what they come to."""
 
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ from phototaxis_lab.parallel import cluster, outcomes
 from phototaxis_lab.results import Results
 from phototaxis_lab.statistics import mean_interval, median_interval
 
+QUIET = 30.0
+"""Seconds between two lines of progress."""
+
 
 def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
     """The outcomes of all cells; those that the folder holds already are not computed again."""
@@ -28,16 +32,19 @@ def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
 
 
 def watched(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int, Outcome]]:
-    """`parallel.outcomes` with a progress bar that counts epochs; without a terminal, a line now and then."""
+    """`parallel.outcomes`, with a progress bar that counts epochs; a line now and then where there is no terminal."""
     if running.backend == "dask" and not running.scheduler:
         raise UserError("--backend dask needs the address of a scheduler: --scheduler tcp://HOST:8786")
-    terminal = sys.stderr.isatty()
-    total = sum(cell.epochs for cell in cells)
-    bar = tqdm(total=total, unit=" epochs", unit_scale=True, mininterval=0.1 if terminal else 30.0, disable=not cells)
+    total, done, spoke = sum(cell.epochs for cell in cells), 0, time.monotonic()
+    bar = tqdm(total=total, unit=" epochs", unit_scale=True, disable=not (cells and sys.stderr.isatty()))
     with cluster(running.backend, running.scheduler), bar:
         for index, outcome in outcomes(cells, running.jobs):
             yield index, outcome
             bar.update(cells[index].epochs)
+            done += cells[index].epochs
+            if bar.disable and time.monotonic() > spoke + QUIET:
+                spoke = time.monotonic()
+                print(f"{done:,} of {total:,} epochs", file=sys.stderr, flush=True)
 
 
 def by_system(results: Results) -> dict[tuple[System, int], list[Outcome]]:

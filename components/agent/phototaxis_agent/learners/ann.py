@@ -1,12 +1,14 @@
 """The paper's neural net (section 5.2): 6-4-1 units for the simple percept, 8-4-1 for the rich one."""
 
+from typing import Any, ClassVar
+
 import numpy as np
 import torch
 from phototaxis.task import ACTIONS, Percept, State
 
 from phototaxis_agent.inputs import Scaled
 from phototaxis_agent.learner import Learner, Transition
-from phototaxis_agent.perceptron import Hyperparameters, Perceptron
+from phototaxis_agent.perceptron import PRESETS, Hyperparameters, Perceptron
 
 REWARDS = (-2.0, 0.0, 2.0, 3.0)
 MAPPED = (0.0, 0.5, 0.75, 1.0)
@@ -17,6 +19,7 @@ class Ann(Learner):
     """One net for all actions: state and motor command in, Q(state, action) out."""
 
     Options = Hyperparameters
+    presets: ClassVar[dict[str, dict[str, Any]]] = PRESETS
     linear = False
     """Whether the output is linear; then rewards are not mapped."""
 

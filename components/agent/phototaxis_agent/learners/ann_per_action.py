@@ -1,5 +1,7 @@
 """One net for each action instead of one for all (section 8 of the paper)."""
 
+from typing import Any, ClassVar
+
 import numpy as np
 import torch
 from phototaxis.task import ACTIONS, Percept, State
@@ -7,13 +9,14 @@ from phototaxis.task import ACTIONS, Percept, State
 from phototaxis_agent.inputs import Scaled
 from phototaxis_agent.learner import Learner, Transition
 from phototaxis_agent.learners.ann import MAPPED, REWARDS
-from phototaxis_agent.perceptron import Hyperparameters, Perceptron
+from phototaxis_agent.perceptron import PRESETS, Hyperparameters, Perceptron
 
 
 class AnnPerAction(Learner):
     """Nine nets, 4-4-1 (simple) or 6-4-1 (rich): only the net of the action taken learns."""
 
     Options = Hyperparameters
+    presets: ClassVar[dict[str, dict[str, Any]]] = PRESETS
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options, self._scaled, self._allowed = options, Scaled(percept), list(percept.actions)

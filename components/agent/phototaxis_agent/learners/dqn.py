@@ -1,6 +1,6 @@
 """A deep Q-network: replay, a target net, and double Q-learning (Mnih et al. 2015; van Hasselt et al. 2016)."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import torch
@@ -17,19 +17,21 @@ torch.set_num_threads(1)  # the nets are too small for more, and one thread alwa
 class Hyperparameters(Struct, frozen=True, kw_only=True):
     """Of the network and its replay."""
 
-    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.8
+    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.6
     """discount factor γ of equation 1"""
     rate: Annotated[float, Meta(gt=0, le=1)] = 0.001
     """learning rate of Adam at the first epoch; it falls geometrically to `rate_end`"""
     rate_end: Annotated[float, Meta(gt=0, le=1)] = 0.001
     """learning rate at the end of the budget and after it"""
-    hidden: Annotated[int, Meta(ge=1, le=4096)] = 32
+    hidden: Annotated[int, Meta(ge=1, le=4096)] = 64
     """units of the one hidden layer (rectified linear)"""
     batch: Annotated[int, Meta(ge=1, le=4096)] = 32
-    """experiences that are replayed after each step"""
+    """experiences that are replayed at a time, beside the newest"""
+    replays: Annotated[int, Meta(ge=1, le=100)] = 2
+    """steps of Adam, each with a batch of its own, after each learning step"""
     memory: Annotated[int, Meta(ge=1, le=1_000_000)] = 10_000
     """experiences that are kept; the oldest make room"""
-    sync: Annotated[int, Meta(ge=1)] = 200
+    sync: Annotated[int, Meta(ge=1)] = 50
     """steps after which the target net becomes a copy of the net"""
 
 
@@ -40,6 +42,9 @@ class Dqn(Learner):
     """
 
     Options = Hyperparameters
+    presets: ClassVar[dict[str, dict[str, Any]]] = {
+        "": {"reward": "potential", "hot": 0.5, "cold": 0.1, "cooling": 0.6, "cap": 50},
+    }
     context: tuple[float, ...] = context.BLANK
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
@@ -78,14 +83,17 @@ class Dqn(Learner):
         self._keep(mirror(percept, state), MIRRORED[action], reward, mirror(percept, following), terminated)
         newest = self._keep(state, action, reward, following, terminated)
         kept = min(self._kept, self._options.memory)
-        errors = self._errors(np.array([newest, *self._rng.integers(kept, size=self._options.batch)]))
+        error = 0.0
         self._adam.param_groups[0]["lr"] = falling(self._options.rate, self._options.rate_end, progress)
-        self._adam.zero_grad()
-        torch.nn.functional.smooth_l1_loss(errors, torch.zeros_like(errors)).backward()
-        self._adam.step()
+        for number in range(self._options.replays):
+            errors = self._errors(np.array([newest, *self._rng.integers(kept, size=self._options.batch)]))
+            error = errors[0].item() if number == 0 else error
+            self._adam.zero_grad()
+            torch.nn.functional.smooth_l1_loss(errors, torch.zeros_like(errors)).backward()
+            self._adam.step()
         if self._kept // 2 % self._options.sync == 0:
             self._target.load_state_dict(self._net.state_dict())
-        return errors[0].item()
+        return error
 
     def _keep(self, *experience: Any) -> int:
         """Put an experience in the place of the oldest; its row."""

@@ -44,7 +44,7 @@ class Mirror(Learner):
     Options = Hyperparameters
     presets: ClassVar[dict[str, dict[str, Any]]] = {
         "": {"reward": "potential", "hot": 0.12, "cold": 0.06, "cooling": 0.6, "cap": 200},
-        "rich": {"cap": 100, "cold": 0.08, "start": 0.7, "ridge": 3.0},
+        "rich": {"cap": 100, "cold": 0.08, "start": 1.0, "ridge": 1.0},
     }
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
@@ -91,7 +91,9 @@ class Mirror(Learner):
         fade = gamma * self._options.decay
         self._traces = {one: fade * trace for one, trace in self._traces.items() if fade * trace > FORGOTTEN}
         self._traces[entry] = self._traces.get(entry, 0.0) + 1.0
-        gain = sum(trace * spread[:, one] for one, trace in self._traces.items())
+        gain = np.zeros(size)
+        for one, trace in self._traces.items():
+            gain += trace * spread[:, one]
         error, slope, scale = reward - table[entry], spread[entry], 1 + gain[entry]
         if following is not None:
             error, slope = error + gamma * table[following], slope - gamma * spread[following]

@@ -1,6 +1,6 @@
 """Watkins's Q(λ): Q-learning with eligibility traces (Sutton and Barto, section 12.10)."""
 
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -27,6 +27,13 @@ class QLambda(qtable.QTable):
     """
 
     Options = Hyperparameters
+    presets: ClassVar[dict[str, dict[str, Any]]] = {
+        "": {
+            "reward": "potential", "alpha": 0.28, "alpha_end": 0.04, "gamma": 0.7,
+            "hot": 0.43, "cold": 0.08, "cooling": 0.6,
+        },
+        "rich": {"cold": 0.1},
+    }  # fmt: skip
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         super().__init__(options, percept, rng)

@@ -166,13 +166,13 @@ def time_piles_up(data: Data) -> Finding:
 
 def longer_separates(data: Data) -> Finding:
     """Claim 8."""
-    words, (before, after) = compare(data, "net, rich", "Q-table, rich", [30_000, 100_000])
+    words, (before, after) = compare(data, "net, rich", "Q-table, rich", [30_000, 60_000])
     apart = after.low > 0 or after.high < 0
     wider = abs(sum(after)) > abs(sum(before))
     return Finding(
         words,
         "confirmed" if apart and wider else "refuted" if not wider and not apart else "undecided",
-        "confirmed would be: after 100,000 epochs the interval excludes 0 and the difference has grown",
+        "confirmed would be: after 60,000 epochs the interval excludes 0 and the difference has grown",
     )
 
 

@@ -8,7 +8,7 @@ Plan = Mapping[str, tuple[System, tuple[int, ...]]]
 """Systems by the name the page gives them, each with its numbers of epochs."""
 
 SIMPLE = 300, 1000, 3000, 10_000
-RICH = 1000, 5000, 10_000, 30_000, 100_000
+RICH = 1000, 5000, 10_000, 30_000, 60_000
 
 PAPER: Plan = {
     "Q-table, simple": (System("qtable", "simple", "difference"), SIMPLE),
@@ -50,14 +50,15 @@ BEYOND: Plan = {
 SHADOWS: Plan = {
     f"{learner}, {percept}, shadows": (System(learner, percept, arena="shadows"), (epochs,))
     for learner, percept, epochs in (
-        ("qtable", "simple", 10_000),
-        ("ann", "simple", 10_000),
-        ("elman", "simple", 10_000),
-        ("qlambda", "simple", 10_000),
-        ("mirror", "simple", 10_000),
-        ("mirror", "rich", 10_000),
-        ("dqn", "simple", 10_000),
-        ("dqn", "continuous", 10_000),
+        ("qtable", "simple", 5000),
+        ("ann", "simple", 5000),
+        ("elman", "simple", 5000),
+        ("qlambda", "simple", 5000),
+        ("mirror", "simple", 5000),
+        ("mirror", "rich", 5000),
+        ("dqn", "simple", 5000),
+        ("dqn", "rich", 5000),
+        ("dqn", "continuous", 5000),
     )
 }
 """Every kind of learner where obstacles shadow the light."""
