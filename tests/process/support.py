@@ -62,9 +62,9 @@ def command(*words: object) -> list[str]:
     return [sys.executable, "-m", "phototaxis_launcher", *map(str, words)]
 
 
-def phototaxis(*words: object) -> subprocess.CompletedProcess[str]:
+def phototaxis(*words: object, deadline: float = DEADLINE) -> subprocess.CompletedProcess[str]:
     """Run a `phototaxis` command to its end."""
-    return subprocess.run(command(*words), capture_output=True, text=True, timeout=DEADLINE, check=False)
+    return subprocess.run(command(*words), capture_output=True, text=True, timeout=deadline, check=False)
 
 
 def result(process: Process) -> dict[str, Any]:

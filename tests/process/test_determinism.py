@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from phototaxis_agent.learner import available
 from support import children, observer, phototaxis, result, wait_status
 
 EPOCHS = 3000
@@ -77,3 +78,23 @@ def test_lost_and_doubled_messages_change_nothing(start, alone, world, tmp_path)
     from phototaxis.checkpoint import load
 
     assert {"state_hash": status.hash, "learner_hash": load(checkpoint)[0].learner_hash} == alone
+
+
+@pytest.mark.parametrize("learner", [name for name in available() if name != "qtable"])
+def test_every_learner_learns_the_same_over_the_bus(up, learner):
+    percept = "continuous" if learner == "dqn" else "rich" if learner == "mirror" else "simple"
+    words = ("--learner", learner, "--percept", percept, "--epochs", 500, "--seed", 5)
+    done = phototaxis("train", *words, "--json")
+    assert done.returncode == 0, done.stderr
+    assert hashes(result(up(*words, "--no-recorder"))) == hashes(json.loads(done.stdout))
+
+
+def test_a_killed_net_continues_with_its_memory_and_its_optimiser(up, world):
+    words = ("--learner", "dqn", "--percept", "continuous", "--epochs", 800, "--seed", 5)
+    launcher = up(*words)
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.epoch > 300, launcher)
+        os.kill(children(launcher.popen.pid)["agent"], signal.SIGKILL)
+    found = result(launcher)
+    assert found["restarts"] == {"agent": 1}
+    assert hashes(found) == hashes(json.loads(phototaxis("train", *words, "--json").stdout))

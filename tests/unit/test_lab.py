@@ -90,12 +90,12 @@ def test_a_grid_is_every_combination():
     ("words", "message"),
     [
         (["--learners", "qtabel"], "no learner 'qtabel'; there are: ann, .*qtable"),
-        (["--percepts", "richer"], r"--percept richer: .*"),
+        (["--percepts", "richer"], "--percept richer: no such percept; there are: simple, rich, continuous"),
         (
             ["--learners", "mirror", "--percepts", "continuous"],
             "--percept continuous: .*countable states: simple, rich",
         ),
-        (["--rewards", "gold"], "--reward gold: .*"),
+        (["--rewards", "gold"], "--reward gold: no such reward; there are: own, difference, static, potential"),
         (["--epochs", "300,0"], "--epochs 0: expected whole numbers above 0"),
         (["--seeds", "4:4"], "--seeds 4:4: no seed from 4 to 4"),
         (["--seeds", "4"], "--seeds 4: .*"),

@@ -91,10 +91,12 @@ def convert(struct: type[T], values: dict[str, Any]) -> T:
     given = {key: value for key, value in values.items() if key in known}
     for item in msgspec.structs.fields(struct):
         if item.name in given:
+            flag, choices = item.name.replace("_", "-"), _plain(item.type)[1]
+            if choices and given[item.name] not in choices:
+                raise UserError(f"--{flag} {given[item.name]}: no such {flag}; there are: {', '.join(choices)}")
             try:
                 msgspec.convert(given[item.name], item.type, strict=False)
             except msgspec.ValidationError as error:
-                flag = item.name.replace("_", "-")
                 raise UserError(f"--{flag} {given[item.name]}: {error}") from None
     return msgspec.convert(given, struct, strict=False)
 

@@ -115,7 +115,7 @@ def table(path: Path, values: np.ndarray, names: Sequence[str]) -> None:
 def _figure(width: float, height: float, columns: int = 1) -> tuple[Figure, Any]:
     mpl.rcParams.update(STYLE)
     figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots(1, columns, squeeze=columns == 1)
+    return figure, figure.subplots(1, columns)
 
 
 def _legend_below(axes: Axes) -> None:
