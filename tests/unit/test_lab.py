@@ -11,6 +11,7 @@ from phototaxis_lab.cell import Cell, Outcome, System, learn, run
 from phototaxis_lab.experiment import Options, cells, main, seed_range
 from phototaxis_lab.results import Results
 from phototaxis_lab.statistics import difference_interval, mean_interval, median_interval
+from phototaxis_sim import arenas
 
 TINY = Cell(System("qtable"), 60, 0)
 
@@ -68,6 +69,18 @@ def test_results_of_another_grid_are_refused(tmp_path: Path):
     Results(tmp_path, [TINY])
     with pytest.raises(UserError, match="holds the results of another grid"):
         Results(tmp_path, [Cell(System("qtable"), 61, 0)])
+
+
+def test_results_in_an_arena_that_was_changed_are_another_grids(tmp_path: Path):
+    mine = tmp_path / "mine.toml"
+    text = (Path(arenas.__file__).parent / "arenas" / "paper.toml").read_text()
+    mine.write_text(text)
+    grid = [Cell(System("qtable", arena=str(mine)), 60, 0)]
+    Results(tmp_path / "r", grid)
+    Results(tmp_path / "r", grid)
+    mine.write_text(text.replace("brightness = 1.0", "brightness = 0.9"))
+    with pytest.raises(UserError, match="holds the results of another grid"):
+        Results(tmp_path / "r", grid)
 
 
 def test_damaged_results_are_named_by_their_line(tmp_path: Path):

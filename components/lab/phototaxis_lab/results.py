@@ -7,8 +7,9 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 from phototaxis.errors import UserError
+from phototaxis_sim import arenas
 
-from phototaxis_lab.cell import Cell, Outcome
+from phototaxis_lab.cell import Cell, Outcome, System
 
 
 class Row(Struct):
@@ -19,7 +20,7 @@ class Row(Struct):
 
 
 class Results:
-    """`grid.json`, the cells, and `results.jsonl`, one line for each that is done.
+    """`grid.json`, the cells and all that decides their outcomes, and `results.jsonl`, one line for each that is done.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ class Results:
 
     def __init__(self, folder: Path, cells: Sequence[Cell]):
         self._path, self.cells = folder / "results.jsonl", list(cells)
-        grid, encoded = folder / "grid.json", msgspec.json.format(msgspec.json.encode(self.cells), indent=0)
+        grid, encoded = folder / "grid.json", _grid(self.cells)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if not grid.exists():
@@ -73,6 +74,16 @@ class Results:
         with self._path.open("ab") as file:
             file.write(msgspec.json.encode(Row(self.cells[index], outcome)) + b"\n")
         self.done[index] = outcome
+
+
+def _grid(cells: Sequence[Cell]) -> bytes:
+    """The cells, each system spelt out: its presets and its arena may have changed since a folder was begun."""
+    systems = {
+        str(system): {"as": System.of(system.setup(), system.arena), "arena": arenas.load(system.arena)}
+        for system in dict.fromkeys(cell.system for cell in cells)
+    }
+    grid = {"systems": systems, "cells": [[str(cell.system), cell.epochs, cell.seed] for cell in cells]}
+    return msgspec.json.format(msgspec.json.encode(grid), indent=1)
 
 
 def _key(cell: Cell) -> Any:

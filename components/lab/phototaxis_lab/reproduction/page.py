@@ -14,10 +14,10 @@ from phototaxis_lab.controllers import Braitenberg, Random
 from phototaxis_lab.measure import Evaluation, Policy, measure
 from phototaxis_lab.reproduction import figures
 from phototaxis_lab.reproduction.claims import CLAIMS, Data, between, state_shares
-from phototaxis_lab.reproduction.plan import BEYOND, EXCHANGED, PAPER, PROPOSED, SHADOWS, WHOLE, Plan
+from phototaxis_lab.reproduction.plan import BEYOND, DISCOUNTS, EXCHANGED, PAPER, PROPOSED, SHADOWS, WHOLE, Plan
 from phototaxis_lab.statistics import mean_interval, median_interval
 
-TUNING = "100 to 219"
+TUNING = "100 to 460"
 """The seeds that hyperparameters were chosen on."""
 
 
@@ -31,7 +31,7 @@ def write(folder: Path, data: Data, seeds: range) -> None:
         last=seeds.stop - 1,
         tuning=TUNING,
         claims=claims_table(data),
-        systems=systems_table({**PAPER, **EXCHANGED, **PROPOSED, **BEYOND}, data, fixed["paper"]),
+        systems=systems_table({**PAPER, **EXCHANGED, **DISCOUNTS, **PROPOSED, **BEYOND}, data, fixed["paper"]),
         shadows=systems_table(SHADOWS, data, fixed["shadows"]),
         hyperparameters=hyperparameters(),
     )

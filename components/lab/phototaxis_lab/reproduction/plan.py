@@ -26,6 +26,13 @@ EXCHANGED: Plan = {
 }
 """Each with the other's reward: the comparison that section 6.2 hopes for."""
 
+DISCOUNTS: Plan = {
+    "Q-table, rich, γ 0.5": (System("qtable", "rich", "static", options=(("gamma", 0.5),)), (10_000,)),
+    "Q-table, rich, γ 0.95": (System("qtable", "rich", "static", options=(("gamma", 0.95),)), (10_000,)),
+    "net, rich, γ 0.9": (System("ann", "rich", "static", options=(("gamma", 0.9),)), (10_000,)),
+}
+"""The rich systems with other discounts, which the paper does not give."""
+
 PROPOSED: Plan = {
     "linear net, simple": (System("ann-linear", "simple", "difference"), (1000, 3000)),
     "net per action, simple": (System("ann-per-action", "simple", "difference"), (1000, 3000)),
@@ -63,7 +70,7 @@ SHADOWS: Plan = {
 }
 """Every kind of learner where obstacles shadow the light."""
 
-WHOLE: Plan = {**PAPER, **EXCHANGED, **PROPOSED, **BEYOND, **SHADOWS}
+WHOLE: Plan = {**PAPER, **EXCHANGED, **DISCOUNTS, **PROPOSED, **BEYOND, **SHADOWS}
 
 
 def cells(seeds: range) -> list[Cell]:
