@@ -5,7 +5,7 @@ import math
 import pytest
 from making import readings
 from phototaxis.messages import Readings
-from phototaxis.task import ACTIONS, FORWARD, PERCEPTS, Memory, TaskOptions, lit
+from phototaxis.task import ACTIONS, FORWARD, MOVING, PERCEPTS, Memory, TaskOptions, lit
 
 
 def sonar(**near: float) -> list[float]:
@@ -38,6 +38,11 @@ def test_rich_never_moves_backwards():
     assert [ACTIONS[i] for i in FORWARD] == [(0, 0), (0, 1), (1, 0), (1, 1), (1, -1), (-1, 1)]
     assert PERCEPTS["rich"].actions == FORWARD
     assert len(PERCEPTS["simple"].actions) == 9
+
+
+def test_continuous_neither_moves_backwards_nor_stands_still():
+    assert [ACTIONS[i] for i in MOVING] == [(0, 1), (1, 0), (1, 1), (1, -1), (-1, 1)]
+    assert PERCEPTS["continuous"].actions == MOVING
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,9 @@ ACTIONS: tuple[tuple[float, float], ...] = (
 FORWARD = tuple(i for i, (left, right) in enumerate(ACTIONS) if left + right >= 0)
 """The actions without net backward motion, which the rich percept allows (section 4.2)."""
 
+MOVING = tuple(i for i in FORWARD if any(ACTIONS[i]))
+"""Those of them that move the robot, which the continuous percept allows."""
+
 MIRRORED = tuple(ACTIONS.index((right, left)) for left, right in ACTIONS)
 """Each action seen in a mirror: left and right exchanged."""
 
@@ -172,7 +175,7 @@ class Rich:
 
 
 class Continuous:
-    """Beyond the paper: twelve real numbers, and no reverse.
+    """Beyond the paper: twelve real numbers; the robot may neither move backwards nor stand still.
 
     The square root of each light (for the paper's light law 1 / distance); their contrast
     (left − right) / (left + right); the relative change of each since the last step; how near the front,
@@ -186,7 +189,7 @@ class Continuous:
         "near front", "near back", "near left", "near right", "front bumper", "rear bumper", "unchanged",
     )  # fmt: skip
     sizes: tuple[int, ...] = (0,) * len(variables)
-    actions: tuple[int, ...] = FORWARD
+    actions: tuple[int, ...] = MOVING
 
     def state(self, senses: Senses, memory: Memory, near: float) -> State:
         (left, right), (left_before, right_before) = senses.light, memory.before

@@ -44,6 +44,7 @@ class Dqn(Learner):
     Options = Hyperparameters
     presets: ClassVar[dict[str, dict[str, Any]]] = {
         "": {"reward": "potential", "hot": 0.5, "cold": 0.1, "cooling": 0.6, "cap": 50},
+        "continuous": {"cooling": 0.8, "batch": 24},
     }
     context: tuple[float, ...] = context.BLANK
 
