@@ -11,7 +11,7 @@ from phototaxis.errors import UserError
 from phototaxis.messages import World
 
 from phototaxis_agent.agent import Agent
-from phototaxis_agent.server import Server
+from phototaxis_agent.server import Mode, Server
 from phototaxis_agent.setup import parse_setup
 
 
@@ -22,6 +22,12 @@ class Options(ComponentOptions, kw_only=True):
     """file to keep the learner's state in (.npz)"""
     resume: str = ""
     """checkpoint to begin with"""
+    take_over: bool = False
+    """take the seat from whoever drives, at the next tick boundary, and leave when a successor drives"""
+    at: Annotated[int, Meta(ge=0)] = 0
+    """with --take-over: not before this tick"""
+    standby: bool = False
+    """drive when the driver vanishes; until then keep in step with it, or learn from what it does"""
     agent_seed: Annotated[int, Meta(ge=0)] | None = None
     """seed of the learner and its exploration (default: the run's)"""
 
@@ -33,11 +39,16 @@ def main(argv: Sequence[str] | None = None) -> None:
         raise UserError(f"--checkpoint {path}: there is no folder {path.parent}")
     resume = Path(options.resume) if options.resume else path if options.restarted else None
 
+    if options.take_over and options.standby:
+        raise UserError("--take-over and --standby exclude each other")
+    take_over = options.take_over and not options.restarted  # it has had its turn
+    mode: Mode = "take over" if take_over else "stand by" if options.standby else "claim"
+
     def make(world: World) -> Agent:
         return setup.agent(world, seed=options.agent_seed)
 
     def serve(bus: Bus) -> None:
-        Server(bus, make, path, resume, required=bool(options.resume)).serve()
+        Server(bus, make, path, resume, bool(options.resume), mode, options.at).serve()
 
     run("agent", options, serve, label=setup.learner)
 

@@ -7,7 +7,7 @@ counted, and the loop goes on.
 
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
@@ -18,7 +18,6 @@ from phototaxis.messages import ControlReply, Decoder, LogRequest, Message, Refu
 from phototaxis.topics import ROLES, TOPICS, Topic, alive_key
 
 REQUESTS: dict[str, type[Message]] = {"log": LogRequest}
-REPLY_LIMIT = 16_384
 
 
 class Event(NamedTuple):
@@ -94,29 +93,31 @@ class Bus:
             print(f"{self.role}: refused a message on {topic}: {why}", file=sys.stderr, flush=True)
         self.refused[reason] += 1
 
-    def ask(self, topic: str, request: Message | None = None, timeout: float = 2.0) -> list[bytes]:
-        """The replies to a query on a topic, in the order in which they came; [] when nobody answered."""
+    def ask(self, topic: str, request: Message | None = None, timeout: float = 2.0) -> Iterator[bytes]:
+        """The replies to a query on a topic as they come; none when nobody answers in time."""
         replies = self._session.get(
             TOPICS[topic].key(self._name),
             payload=None if request is None else encode(request),
             timeout=timeout,
+            target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+        return (reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None)
 
-    def ask_one(self, topic: str, kind: type[Any], request: Message | None = None, timeout: float = 2.0) -> Any:
+    def ask_one(self, topic: str, request: Message | None = None, timeout: float = 2.0) -> Any:
         """The first valid reply as a message, or None."""
-        limit = TOPICS[topic].limit if request is None else REPLY_LIMIT
+        asked = TOPICS[topic]
+        decoder = Decoder(asked.reply, asked.reply_limit) if asked.reply else Decoder(asked.message, asked.limit)
         for payload in self.ask(topic, request, timeout):
             try:
-                return Decoder(kind, limit)(payload)
+                return decoder(payload)
             except Refused as why:
                 self.refuse(topic, str(why))
         return None
 
     def control(self, request: Message, timeout: float = 2.0) -> ControlReply | None:
         """Ask the simulation for something; None when it did not answer."""
-        return self.ask_one("control", ControlReply, request, timeout)
+        return self.ask_one("control", request, timeout)
 
     def close(self) -> None:
         """Take back what was declared, the token last."""

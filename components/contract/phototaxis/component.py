@@ -6,6 +6,9 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from typing import Annotated
+
+from msgspec import Meta
 
 from phototaxis.bus import Bus
 from phototaxis.errors import one_line
@@ -17,6 +20,8 @@ class ComponentOptions(BusOptions, kw_only=True):
 
     tethered: bool = False
     """end when standard input closes, so that no process outlives the one that started it"""
+    ident: Annotated[str, Meta(max_length=24, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    """its name on the bus, which nobody else may have (default: made up)"""
     restarted: bool = False
     """this process replaces one that died: continue from what that one left on disk, if anything"""
 
@@ -26,13 +31,18 @@ def run(role: str, options: ComponentOptions, serve: Callable[[Bus], None], labe
 
     SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it.
     """
-    ident = f"{label or role}-{secrets.token_hex(2)}"
-    with open_session(role, options) as session, Bus(session, options.name, role, ident) as bus:
+    ident = options.ident or made_up(label or role)
+    with open_session(role, options, ident) as session, Bus(session, options.name, role, ident) as bus:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: bus.stop())
         if options.tethered:
             threading.Thread(target=_hold_tether, args=(bus,), daemon=True).start()
         serve(bus)
+
+
+def made_up(label: str) -> str:
+    """A name on the bus that is not taken."""
+    return f"{label[:19]}-{secrets.token_hex(2)}"
 
 
 def _hold_tether(bus: Bus) -> None:

@@ -1,5 +1,6 @@
 """Opening a Zenoh session: from flags, a Zenoh config file, ZENOH_CONFIG, or this machine's own sockets."""
 
+import fcntl
 import getpass
 import ipaddress
 import json
@@ -49,20 +50,40 @@ def socket_folder(name: str) -> Path:
         info = part.lstat()
         if not stat.S_ISDIR(info.st_mode) or info.st_uid != os.getuid() or info.st_mode & 0o077:
             raise Unavailable(f"{part} is not a private folder of this user; remove it or set XDG_RUNTIME_DIR")
-    if len(str(folder)) > 90:
+    if len(str(folder)) > 75:
         raise Unavailable(f"{folder} is too long for a Unix socket; set XDG_RUNTIME_DIR to a shorter folder")
     return folder
 
 
-def local_config(role: str, name: str) -> zenoh.Config:
-    """Peers on this machine, linked by Unix sockets: no router, no multicast, no gossip, no network."""
+def local_config(role: str, name: str, ident: str) -> zenoh.Config:
+    """Peers on this machine, linked by Unix sockets: no router, no multicast, no gossip, no network.
+
+    Of agents there may be several, so each has a socket of its own.
+    """
     folder = socket_folder(name)
     place = ROLES[role]
+    own = f"agent-{ident}" if role == "agent" else role
+    others = [found for other in place.dials for found in (_agents(folder) if other == "agent" else [other])]
     return _config(
         "peer",
-        listen=[f"unixsock-stream/{folder}/{role}"] if place.listens else [],
-        connect=[f"unixsock-stream/{folder}/{other}" for other in place.dials],
+        listen=[f"unixsock-stream/{folder}/{own}"] if place.listens else [],
+        connect=[f"unixsock-stream/{folder}/{other}" for other in others],
     )
+
+
+def _agents(folder: Path) -> list[str]:
+    """The sockets of the agents that are there; those that a killed agent left are removed."""
+    found = []
+    for lock in folder.glob("agent-*.lock"):
+        with lock.open() as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                found.append(lock.stem)
+            else:
+                lock.with_suffix("").unlink(missing_ok=True)
+                lock.unlink(missing_ok=True)
+    return found
 
 
 def _config(mode: str, listen: list[str], connect: list[str]) -> zenoh.Config:
@@ -90,8 +111,8 @@ def _config(mode: str, listen: list[str], connect: list[str]) -> zenoh.Config:
     )
 
 
-def open_session(role: str, options: BusOptions) -> zenoh.Session:
-    """Open this component's session.
+def open_session(role: str, options: BusOptions, ident: str = "") -> zenoh.Session:
+    """Open this component's session; `ident` is its name on the bus.
 
     `--listen` and `--connect` win over `--zenoh-config`, that over ZENOH_CONFIG, and that over the
     sockets of this machine. With `--connect` alone the component is a client (of a router, or of a
@@ -113,7 +134,7 @@ def open_session(role: str, options: BusOptions) -> zenoh.Session:
         except zenoh.ZError as error:
             raise UserError(f"{file}: not a Zenoh configuration: {_first_line(error)}") from None
     else:
-        config = local_config(role, options.name)
+        config = local_config(role, options.name, ident)
     if not options.insecure:
         for endpoint in _listeners(config):
             refuse_open_door(endpoint)

@@ -54,7 +54,7 @@ class Server:
 
     def _meet(self) -> None:
         """Begin a recording if there is a run that is not yet recorded."""
-        world = self._bus.ask_one("world", World)
+        world = self._bus.ask_one("world")
         if world is None or world.run == self._run:
             return
         if self._translator is not None:
