@@ -6,6 +6,7 @@ counted, and the loop goes on.
 """
 
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
@@ -118,6 +119,15 @@ class Bus:
     def control(self, request: Message, timeout: float = 2.0) -> ControlReply | None:
         """Ask the simulation for something; None when it did not answer."""
         return self.ask_one("control", request, timeout)
+
+    def wait_for(self, role: str, timeout: float) -> bool:
+        """Wait until a component of that role is on the bus, dropping what comes meanwhile; whether one is."""
+        deadline = time.monotonic() + timeout
+        while (left := deadline - time.monotonic()) > 0:
+            event = self.receive(timeout=left)
+            if event is not None and event.topic == "alive" and event.message[0] == role:
+                return True
+        return False
 
     def close(self) -> None:
         """Take back what was declared, the token last."""

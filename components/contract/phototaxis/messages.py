@@ -230,9 +230,11 @@ class LaunchReply(Message):
     """What the launcher says."""
 
     reason: str = ""
-    """Why it did not; "" when it did."""
+    """Why nothing came of it; "" when the new agent drives."""
     agent: Name = ""
     """Name of the new agent."""
+    tick: Count = 0
+    """It drives from this tick on."""
 
 
 Column = list[float]

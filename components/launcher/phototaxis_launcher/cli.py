@@ -26,6 +26,7 @@ VERBS = {
         "phototaxis_launcher.ask:status", "launcher", "who is alive, which tick, who drives, what is awaited"
     ),
     "control": Verb("phototaxis_launcher.ask:control", "launcher", "pause, resume, step, speed, reset, stop"),
+    "swap": Verb("phototaxis_launcher.swap:main", "launcher", "hand the seat to another learner while the robot runs"),
     "sim": Verb("phototaxis_sim.__main__:main", "sim", "the simulation alone"),
     "sensors": Verb("phototaxis_sensors.__main__:main", "sensors", "the sensors alone"),
     "agent": Verb("phototaxis_agent.__main__:main", "agent", "an agent alone"),
