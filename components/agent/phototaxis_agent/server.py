@@ -77,8 +77,8 @@ class Server:
         self._journal = None if path is None else Journal(path.with_suffix(".journal"))
         self._session: Session | None = None
         self._driving = self._seated = self._replaced = self._enlisted = False
-        self._leader = ""
-        """The driver that is followed, or that handed over."""
+        self._leader = self._predecessor = ""
+        """The driver that is followed; the last one that was seen."""
         self._related = self._in_step = False
         """Whether it is of the same kind; whether this agent is what it is."""
         self._save_at = self._table_at = self._claim_at = 0.0
@@ -144,6 +144,7 @@ class Server:
         """Learn from what another driver does; a standby of its kind keeps in step with it."""
         if self._mode == "claim" or not readings.driver:
             return
+        self._predecessor = readings.driver
         if readings.driver != self._leader and readings.author == readings.driver:  # it has nothing to ask us any more
             self._leader = readings.driver
             self._related = self._inherit(session, probe=True)
@@ -156,11 +157,10 @@ class Server:
 
     def _sit(self, session: Session, readings: Readings) -> None:
         """Begin to drive, with what the predecessor knows if it is of the same kind."""
-        if self._related and not self._in_step:
+        if self._predecessor and not self._in_step and self._mode != "claim":
+            self._leader = self._predecessor
             if self._inherit(session):
                 self._say(f"inherited what {self._leader} knew at tick {session.agent.tick[1]}")
-            else:
-                self._say(f"{self._leader} did not hand over what it knew")
         self._driving = self._seated = self._in_step = True
         self._say(f"drives from tick {readings.tick} on")
 
@@ -169,10 +169,10 @@ class Server:
         agent = session.agent
         request = CheckpointRequest(self._leader, agent.name, agent.task.percept, probe)
         reply: CheckpointReply | None = self._bus.ask_one("checkpoint", request, INHERIT_WITHIN)
-        if reply is None or reply.reason:
-            return False
-        if probe:
-            return True
+        if reply is None or reply.reason or probe:
+            if not probe:
+                self._say(f"inherited nothing: {self._leader} {'does not answer' if reply is None else reply.reason}")
+            return reply is not None and not reply.reason
         try:
             meta, arrays = decode(reply.data, self._leader)
             if meta.run != session.world.run:
@@ -239,7 +239,7 @@ class Server:
             agent = self._session.agent
         self._session = Session(world, agent, Once(agent, agent.tick, agent.command))
         self._driving = self._seated = self._enlisted = self._related = self._in_step = False
-        self._leader = ""
+        self._leader = self._predecessor = ""
         self._replay(self._session)
         self._save_at = time.monotonic() + SAVE_EVERY
         return self._session
