@@ -29,7 +29,7 @@ from phototaxis_agent.agent import Agent
 TABLE_EVERY = 0.5
 SAVE_EVERY = 10.0
 CLAIM_EVERY = 0.2
-INHERIT_WITHIN = 10.0
+INHERIT_WITHIN = 4.0
 """Seconds that a predecessor gets to hand over what it knows."""
 
 Mode = Literal["claim", "take over", "stand by"]
@@ -168,7 +168,7 @@ class Server:
         """Become what the leader is; whether it could. `probe`: only find out whether it would fit."""
         agent = session.agent
         request = CheckpointRequest(self._leader, agent.name, agent.task.percept, probe)
-        reply: CheckpointReply | None = self._bus.ask_one("checkpoint", request, INHERIT_WITHIN)
+        reply: CheckpointReply | None = self._bus.ask_agent(self._leader, "checkpoint", request, INHERIT_WITHIN)
         if reply is None or reply.reason or probe:
             if not probe:
                 self._say(f"inherited nothing: {self._leader} {'does not answer' if reply is None else reply.reason}")

@@ -9,6 +9,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
@@ -19,6 +20,9 @@ from phototaxis.messages import ControlReply, Decoder, LogRequest, Message, Refu
 from phototaxis.topics import ROLES, TOPICS, Topic, alive_key
 
 REQUESTS: dict[str, type[Message]] = {"log": LogRequest}
+
+
+Reach = Callable[[str], AbstractContextManager[zenoh.Session | None]]
 
 
 class Event(NamedTuple):
@@ -41,10 +45,12 @@ class Bus:
     name : prefix of the world's keys.
     role : a key of `ROLES`; says which topics are written and read.
     ident : unique name of this component, shown in its liveliness token.
+    reach : gives a session in which an agent, named by its ident, can be asked; by default `session`.
     """
 
-    def __init__(self, session: zenoh.Session, name: str, role: str, ident: str):
+    def __init__(self, session: zenoh.Session, name: str, role: str, ident: str, reach: Reach | None = None):
         self.role, self.ident, self._session, self._name = role, ident, session, name
+        self._reach: Reach = reach or (lambda _: nullcontext(session))
         self.refused: Counter[str] = Counter()
         self._inbox: SimpleQueue[tuple[str, Any]] = SimpleQueue()
         self._decoders: dict[str, Decoder[Any]] = {}
@@ -94,9 +100,11 @@ class Bus:
             print(f"{self.role}: refused a message on {topic}: {why}", file=sys.stderr, flush=True)
         self.refused[reason] += 1
 
-    def ask(self, topic: str, request: Message | None = None, timeout: float = 2.0) -> Iterator[bytes]:
+    def ask(
+        self, topic: str, request: Message | None = None, timeout: float = 2.0, session: zenoh.Session | None = None
+    ) -> Iterator[bytes]:
         """The replies to a query on a topic as they come; none when nobody answers in time."""
-        replies = self._session.get(
+        replies = (session or self._session).get(
             TOPICS[topic].key(self._name),
             payload=None if request is None else encode(request),
             timeout=timeout,
@@ -105,11 +113,18 @@ class Bus:
         )
         return (reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None)
 
-    def ask_one(self, topic: str, request: Message | None = None, timeout: float = 2.0) -> Any:
+    def ask_agent(self, ident: str, topic: str, request: Message, timeout: float) -> Any:
+        """The answer of one agent as a message; None when it is not there, or gives none in time."""
+        with self._reach(ident) as session:
+            return None if session is None else self.ask_one(topic, request, timeout, session)
+
+    def ask_one(
+        self, topic: str, request: Message | None = None, timeout: float = 2.0, session: zenoh.Session | None = None
+    ) -> Any:
         """The first valid reply as a message, or None."""
         asked = TOPICS[topic]
         decoder = Decoder(asked.reply, asked.reply_limit) if asked.reply else Decoder(asked.message, asked.limit)
-        for payload in self.ask(topic, request, timeout):
+        for payload in self.ask(topic, request, timeout, session):
             try:
                 return decoder(payload)
             except Refused as why:

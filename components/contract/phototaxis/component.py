@@ -6,13 +6,14 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated
 
 from msgspec import Meta
 
 from phototaxis.bus import Bus
 from phototaxis.errors import one_line
-from phototaxis.session import BusOptions, open_session
+from phototaxis.session import BusOptions, open_session, reaching
 
 
 class ComponentOptions(BusOptions, kw_only=True):
@@ -32,7 +33,10 @@ def run(role: str, options: ComponentOptions, serve: Callable[[Bus], None], labe
     SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it.
     """
     ident = options.ident or made_up(label or role)
-    with open_session(role, options, ident) as session, Bus(session, options.name, role, ident) as bus:
+    with (
+        open_session(role, options, ident) as session,
+        Bus(session, options.name, role, ident, partial(reaching, session, options)) as bus,
+    ):
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: bus.stop())
         if options.tethered:

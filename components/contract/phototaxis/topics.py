@@ -90,13 +90,11 @@ ROLES = {
     "sim": Role(reads=("command",), dials=()),
     "sensors": Role(reads=("state",), dials=("sim",), asks=("world",)),
     "recorder": Role(reads=("log/sim", "log/sensors", "log/agent"), dials=("sim", "sensors"), asks=("world",)),
-    "agent": Role(
-        reads=("readings",), dials=("sim", "sensors", "recorder", "agent"), asks=("world", "control", "checkpoint")
-    ),
+    "agent": Role(reads=("readings",), dials=("sim", "sensors", "recorder"), asks=("world", "control", "checkpoint")),
     "launcher": Role(reads=("status",), dials=("sim",), asks=("control",)),
     "observer": Role(reads=("status",), dials=("sim", "launcher"), listens=False, asks=("world", "control", "launch")),
 }
-"""sim listens, the others dial it. Agents come and go freely: a new one dials those that are there."""
+"""sim listens, the others dial it. Agents come and go freely: they dial, and listen only for their successors."""
 
 
 def alive_key(prefix: str, role: str, ident: str) -> str:

@@ -27,6 +27,11 @@ VERBS = {
     ),
     "control": Verb("phototaxis_launcher.ask:control", "launcher", "pause, resume, step, speed, reset, stop"),
     "swap": Verb("phototaxis_launcher.swap:main", "launcher", "hand the seat to another learner while the robot runs"),
+    "router": Verb("phototaxis_launcher.router:main", "launcher", "a Zenoh router, for components on several machines"),
+    "certs": Verb("phototaxis_launcher.certs:main", "certs", "certificates and passwords for a guarded router"),
+    "check": Verb(
+        "phototaxis_lab.check:main", "lab", "an agent against the contract; rights and wire format against the code"
+    ),
     "sim": Verb("phototaxis_sim.__main__:main", "sim", "the simulation alone"),
     "sensors": Verb("phototaxis_sensors.__main__:main", "sensors", "the sensors alone"),
     "agent": Verb("phototaxis_agent.__main__:main", "agent", "an agent alone"),
