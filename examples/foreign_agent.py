@@ -8,7 +8,6 @@ python examples/foreign_agent.py tcp/127.0.0.1:7447
 
 import json
 import sys
-import time
 from queue import Empty, SimpleQueue
 
 import msgpack
@@ -22,7 +21,7 @@ with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
     session.declare_subscriber(
         f"{world}/readings", lambda sample: inbox.put(msgpack.unpackb(sample.payload.to_bytes()))
     )
-    session.liveliness().declare_token(f"{world}/alive/agent/{me}")
+    token = session.liveliness().declare_token(f"{world}/alive/agent/{me}")  # lasts as long as the variable
     newest, claim = -1, msgpack.packb({"verb": "claim", "agent": me})
     while True:
         try:

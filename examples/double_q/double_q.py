@@ -1,4 +1,4 @@
-"""Double Q-learning (van Hasselt 2010): two tables, each judged by the other, so that noise does not look like value."""
+"""Double Q-learning (van Hasselt 2010): two tables, each judged by the other; noise does not look like value."""
 
 from typing import Annotated
 

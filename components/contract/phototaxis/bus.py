@@ -49,7 +49,7 @@ class Bus:
     """
 
     def __init__(self, session: zenoh.Session, name: str, role: str, ident: str, reach: Reach | None = None):
-        self.role, self.ident, self._session, self._name = role, ident, session, name
+        self.role, self.ident, self.name, self._session = role, ident, name, session
         self._reach: Reach = reach or (lambda _: nullcontext(session))
         self.refused: Counter[str] = Counter()
         self._inbox: SimpleQueue[tuple[str, Any]] = SimpleQueue()
@@ -105,7 +105,7 @@ class Bus:
     ) -> Iterator[bytes]:
         """The replies to a query on a topic as they come; none when nobody answers in time."""
         replies = (session or self._session).get(
-            TOPICS[topic].key(self._name),
+            TOPICS[topic].key(self.name),
             payload=None if request is None else encode(request),
             timeout=timeout,
             target=zenoh.QueryTarget.ALL,
@@ -159,11 +159,11 @@ class Bus:
 
     def _subscribe(self, topic: Topic) -> None:
         self._decoders[topic.name] = Decoder(topic.message, topic.limit)
-        key = topic.key(self._name)
+        key = topic.key(self.name)
         self._declared.append(self._session.declare_subscriber(key, self._callback(topic.name)))
 
     def _offer(self, topic: Topic) -> None:
-        key = topic.key(self._name)
+        key = topic.key(self.name)
         if topic.kind in ("stream", "log"):
             steady = topic.kind == "stream"
             self._publishers[topic.name] = self._session.declare_publisher(

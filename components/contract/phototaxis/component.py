@@ -5,10 +5,13 @@ import secrets
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import ExitStack
 from functools import partial
 from typing import Annotated
 
+import msgspec
 from msgspec import Meta
 
 from phototaxis.bus import Bus
@@ -27,21 +30,41 @@ class ComponentOptions(BusOptions, kw_only=True):
     """this process replaces one that died: continue from what that one left on disk, if anything"""
 
 
-def run(role: str, options: ComponentOptions, serve: Callable[[Bus], None], label: str = "") -> None:
+def run(
+    role: str, options: ComponentOptions, serve: Callable[[Bus], None], label: str = "", worlds: Sequence[str] = ()
+) -> None:
     """Open the bus as `role`, call `serve(bus)` and close everything, whatever happens.
 
-    SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it.
+    SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it. With several `worlds` in
+    place of `options.name`, each is served in a thread of its own; the first error ends all of them.
     """
     ident = options.ident or made_up(label or role)
-    with (
-        open_session(role, options, ident) as session,
-        Bus(session, options.name, role, ident, partial(reaching, session, options)) as bus,
-    ):
+    with ExitStack() as stack:
+        buses: list[Bus] = []
+        for name in worlds or [options.name]:
+            own = msgspec.structs.replace(options, name=name)
+            session = stack.enter_context(open_session(role, own, ident))
+            buses.append(stack.enter_context(Bus(session, name, role, ident, partial(reaching, session, own))))
+        stop = partial(_stop, buses)
         for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, lambda *_: bus.stop())
+            signal.signal(number, stop)
         if options.tethered:
-            threading.Thread(target=_hold_tether, args=(bus,), daemon=True).start()
-        serve(bus)
+            threading.Thread(target=_hold_tether, args=(stop,), daemon=True).start()
+        if len(buses) == 1:
+            serve(buses[0])
+            return
+        with ThreadPoolExecutor(len(buses)) as pool:
+            served = [pool.submit(serve, bus) for bus in buses]
+            for one in as_completed(served):
+                if one.exception():
+                    stop()
+        for one in served:
+            one.result()
+
+
+def _stop(buses: Sequence[Bus], *_: object) -> None:
+    for bus in buses:
+        bus.stop()
 
 
 def made_up(label: str) -> str:
@@ -49,10 +72,10 @@ def made_up(label: str) -> str:
     return f"{label[:19]}-{secrets.token_hex(2)}"
 
 
-def _hold_tether(bus: Bus) -> None:
+def _hold_tether(stop: Callable[[], None]) -> None:
     while os.read(sys.stdin.fileno(), 4096):
         pass
-    bus.stop()
+    stop()
 
 
 def entry(body: Callable[[], None]) -> None:

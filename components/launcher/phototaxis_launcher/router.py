@@ -2,8 +2,8 @@
 
 import signal
 import sys
-import threading
 from collections.abc import Sequence
+from queue import SimpleQueue
 
 from phototaxis.options import parse
 from phototaxis.session import BusOptions, open_router
@@ -16,10 +16,10 @@ class Options(BusOptions, kw_only=True):
 def main(argv: Sequence[str]) -> int:
     about = "A Zenoh router (zenohd does the same): the one place that components on several machines connect to."
     options = parse(Options, argv, "phototaxis router", about)
-    ended = threading.Event()
+    ended: SimpleQueue[None] = SimpleQueue()  # whose put, unlike an Event's set, may interrupt its get
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: ended.set())
+        signal.signal(number, lambda *_: ended.put(None))
     with open_router(options) as session:
         print(f"router {session.zid()} is up", file=sys.stderr, flush=True)
-        ended.wait()
+        ended.get()
     return 0
