@@ -1,10 +1,15 @@
 """A guarded router: who comes in, and what each may do there; with real sessions and certificates."""
 
 import json
+import os
+import secrets
+import shutil
 import socket
 import stat
+import subprocess
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
@@ -12,7 +17,7 @@ from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
 from phototaxis.router import client_config
 from phototaxis.session import BusOptions, open_session
-from support import Process, phototaxis, wait_status
+from support import Process, command, phototaxis, wait_status
 
 WORLDS = ("a", "b")
 ANYWHERE = "0.0.0.0"  # noqa: S104
@@ -51,6 +56,11 @@ def guarded(request, start, certs):
 
 def session(place, role: str, world: str = "a") -> zenoh.Session:
     return zenoh.open(zenoh.Config.from_file(place(role, world)[1]))
+
+
+def somebody_listens(publisher: zenoh.Publisher) -> bool:
+    status: Any = publisher.matching_status
+    return status.matching
 
 
 def test_a_run_through_the_guarded_router_is_the_same(start, guarded, tmp_path):
@@ -120,10 +130,10 @@ def test_an_agent_with_good_credentials_can_do_what_an_agent_does_and_no_more(gu
         mine = agent.declare_publisher("a/command")
         others = [agent.declare_publisher(key) for key in ("a/state", "b/command", "a/status")]
         deadline = time.monotonic() + 10
-        while not mine.matching_status.matching:
+        while not somebody_listens(mine):
             assert time.monotonic() < deadline
         for forbidden in others:
-            assert not forbidden.matching_status.matching  # the intruder sees that nobody listens to it
+            assert not somebody_listens(forbidden)  # the intruder sees that nobody listens to it
             forbidden.put(b"forged")
         mine.put(b"0" * 1_000_000)
         sim.put("a/status", b"status")
@@ -174,3 +184,53 @@ def test_a_router_beyond_this_machine_needs_credentials(start, tmp_path):
     file.write_text(file.read_text().replace('"default_permission": "deny"', '"default_permission": "allow"'))
     assert phototaxis("router", "--zenoh-config", file).returncode == 2
     assert phototaxis("router").returncode == 2
+
+
+@pytest.fixture
+def namespace():
+    """Another network namespace; gives the words that run a command there, and our address as it sees it."""
+    ip = shutil.which("ip")
+    if os.geteuid() != 0 or ip is None:
+        pytest.skip("needs root and `ip` to make a network namespace")
+    name, net = f"pt{secrets.token_hex(3)}", f"10.213.{secrets.randbelow(256)}"
+    steps = (
+        f"{ip} netns add {name}",
+        f"{ip} link add {name}a type veth peer name {name}b netns {name}",
+        f"{ip} addr add {net}.1/30 dev {name}a",
+        f"{ip} link set {name}a up",
+        f"{ip} netns exec {name} ip addr add {net}.2/30 dev {name}b",
+        f"{ip} netns exec {name} ip link set {name}b up",
+    )
+    try:
+        for step in steps:
+            done = subprocess.run(step.split(), capture_output=True, text=True, check=False)
+            if done.returncode:
+                pytest.skip(f"this machine allows no network namespace: {step}: {done.stderr.strip()}")
+        yield [ip, "netns", "exec", name], f"{net}.1"
+    finally:
+        subprocess.run([ip, "netns", "del", name], capture_output=True, check=False)
+        subprocess.run([ip, "link", "del", f"{name}a"], capture_output=True, check=False)
+
+
+def test_a_successor_in_another_network_inherits_through_the_guarded_router(namespace, start, tmp_path):
+    enter, address = namespace
+    certs, words = tmp_path / "certs", ("--epochs", 600, "--seed", 2)
+    made = phototaxis("certs", "--out", certs, "--worlds", "a", "--host", address, "--listen", address, "--port", 7447)
+    assert made.returncode == 0, made.stderr
+    start("router", "--zenoh-config", certs / "router-mtls.json5")
+
+    def place(role: str) -> tuple[object, ...]:
+        return role, "--name", "a", "--zenoh-config", certs / f"a.{role}.mtls.json5"
+
+    sim, sensors = start(*place("sim"), *words), start(*place("sensors"))
+    remote = (*place("agent"), "--take-over", "--at", 300, "--ident", "remote", "--checkpoint", tmp_path / "c.npz")
+    second = start("remote", argv=[*enter, *command(*remote)])
+    options = BusOptions(name="a", zenoh_config=str(certs / "a.observer.mtls.json5"))
+    with open_session("observer", options) as observing, Bus(observing, "a", "observer", "test") as bus:
+        wait_status(bus, lambda status: status.next == ["remote"], sim, sensors, second)
+        start(*place("agent"), "--ident", "near")
+        status = wait_status(bus, lambda status: status.phase == "finished", sim, sensors, second)
+    assert [one.driver for one in status.drivers] == ["near", "remote"]
+    alone = json.loads(phototaxis("train", *words, "--json").stdout)
+    assert status.hash == alone["state_hash"]
+    assert load(tmp_path / "c.npz")[0].learner_hash == alone["learner_hash"]
