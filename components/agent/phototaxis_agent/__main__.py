@@ -43,8 +43,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         raise UserError(f"--checkpoint {kept}: there is no folder {folder}")
     if options.take_over and options.standby:
         raise UserError("--take-over and --standby exclude each other")
-    take_over = options.take_over and not options.restarted  # it has had its turn
-    mode: Mode = "take over" if take_over else "stand by" if options.standby else "claim"
+    mode: Mode = "take over" if options.take_over else "stand by" if options.standby else "claim"
 
     def make(world: World) -> Agent:
         return setup.agent(world, seed=options.agent_seed)

@@ -239,6 +239,7 @@ class Run:
                 {
                     "driver": one.driver,
                     "learner": names[one.driver].label if one.driver in names else None,
+                    "checkpoint": str(self._checkpoint(names[one.driver].name)) if one.driver in names else None,
                     "from_tick": one.tick,
                     "how": one.how,
                 }
