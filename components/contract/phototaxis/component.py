@@ -6,6 +6,9 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from typing import Annotated
+
+from msgspec import Meta
 
 from phototaxis.bus import Bus
 from phototaxis.errors import one_line
@@ -15,6 +18,8 @@ from phototaxis.session import BusOptions, open_session
 class ComponentOptions(BusOptions, kw_only=True):
     """Options that every component has."""
 
+    id: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    """a word of your choice in this component's name on the bus, by which `phototaxis health` finds it"""
     tethered: bool = False
     """end when standard input closes, so that no process outlives the one that started it"""
     restarted: bool = False
@@ -26,7 +31,7 @@ def run(role: str, options: ComponentOptions, serve: Callable[[Bus], None], labe
 
     SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it.
     """
-    ident = f"{label or role}-{secrets.token_hex(2)}"
+    ident = "-".join(filter(None, (label or role, options.id, secrets.token_hex(2))))
     with open_session(role, options) as session, Bus(session, options.name, role, ident) as bus:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: bus.stop())

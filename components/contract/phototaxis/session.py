@@ -75,8 +75,8 @@ def _config(mode: str, listen: list[str], connect: list[str]) -> zenoh.Config:
                 "listen": {"endpoints": listen},
                 "connect": {
                     "endpoints": connect,
-                    "timeout_ms": -1 if mode == "peer" else 5_000,
-                    "exit_on_failure": mode != "peer",
+                    "timeout_ms": 5_000 if mode == "client" else -1,
+                    "exit_on_failure": mode == "client",
                     "retry": retry,
                 },
                 "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
@@ -106,7 +106,8 @@ def open_session(role: str, options: BusOptions) -> zenoh.Session:
     """
     file = options.zenoh_config or os.environ.get("ZENOH_CONFIG", "")
     if options.listen or options.connect:
-        config = _config("peer" if options.listen else "client", options.listen, options.connect)
+        mode = "router" if role == "router" else "peer" if options.listen else "client"
+        config = _config(mode, options.listen, options.connect)
     elif file:
         try:
             config = zenoh.Config.from_file(file)

@@ -30,6 +30,8 @@ VERBS = {
     "sensors": Verb("phototaxis_sensors.__main__:main", "sensors", "the sensors alone"),
     "agent": Verb("phototaxis_agent.__main__:main", "agent", "an agent alone"),
     "recorder": Verb("phototaxis_recorder.__main__:main", "recorder", "the recorder alone"),
+    "router": Verb("phototaxis.router:main", "launcher", "a Zenoh router, for components on several machines"),
+    "health": Verb("phototaxis_launcher.health:main", "launcher", "is this component on the bus? for health checks"),
     "train": Verb("phototaxis_lab.train:main", "lab", "the same learning in one process, without a bus"),
     "experiment": Verb("phototaxis_lab.experiment:main", "lab", "a grid of agents and seeds, in parallel, resumable"),
     "reproduce": Verb("phototaxis_lab.reproduce:main", "lab", "the paper's experiments: a page of claims and figures"),

@@ -18,7 +18,7 @@ class Options(ComponentOptions, kw_only=True):
     """Options of the recorder."""
 
     output: str = "recording.rrd"
-    """file to record into; where it stands already, the new one gets a number"""
+    """file to record into, or a folder for RUN.rrd; where it stands already, the new one gets a number"""
     bind: str = "127.0.0.1"
     """address that the viewer's ports listen on"""
     grpc_port: Annotated[int, Meta(ge=0, le=65535)] = 9876
@@ -45,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     recording: list[rr.RecordingStream] = []
 
     def start(world: World) -> Translator:
-        file = fresh_file(output)
+        file = fresh_file(output / f"{world.run}.rrd" if output.is_dir() else output)
         recording.append(open_recording(world, file, options.bind, grpc_port, options.memory))
         return Translator(recording[0], world)
 
