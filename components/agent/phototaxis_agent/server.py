@@ -152,5 +152,5 @@ class Server:
         now = time.monotonic()
         if now >= self._table_at:
             self._table_at = now + TABLE_EVERY
-            log.values, log.visits = agent.table(), list(agent.visits)
+            log.values, log.visits, log.current = agent.table(), list(agent.visits), agent.current()
         return log

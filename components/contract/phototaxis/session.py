@@ -81,7 +81,7 @@ def _config(mode: str, listen: list[str], connect: list[str]) -> zenoh.Config:
                 },
                 "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
                 "transport": {
-                    "unicast": {"qos": {"enabled": False}},
+                    "unicast": {"qos": {"enabled": mode != "peer"}},
                     "shared_memory": {"enabled": False},
                     "link": {"tx": {"lease": 1000, "queue": {"congestion_control": {"block": block}}}},
                 },

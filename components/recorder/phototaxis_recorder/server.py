@@ -6,11 +6,12 @@ from typing import Any
 
 from phototaxis.bus import Bus
 from phototaxis.messages import Decoder, LogRequest, Refused, World
-from phototaxis.topics import TOPICS
+from phototaxis.topics import ROLES, TOPICS
 
 from phototaxis_recorder.translate import Translator
 
 FLUSH_EVERY = 0.15
+CATCH_UP_EVERY = 1.0
 LOGS = ("log/sim", "log/sensors", "log/agent")
 
 
@@ -32,7 +33,7 @@ class Server:
 
     def serve(self) -> None:
         """Record until a "stop" event; then take what is still to be had and close the recording."""
-        flush_at = 0.0
+        flush_at = catch_up_at = 0.0
         while True:
             event = self._bus.receive(timeout=FLUSH_EVERY)
             if event is not None:
@@ -40,17 +41,28 @@ class Server:
                     break
                 if event.topic in LOGS:
                     self._take(event.topic, event.message)
-                elif event.topic == "alive" and event.message[0] == "sim":
-                    self._meet()
+                elif event.topic in ("alive", "gone"):
+                    self._notice(event.topic, *event.message)
             now = time.monotonic()
             if self._translator is not None and now >= flush_at:
                 self._translator.flush()
                 flush_at = now + FLUSH_EVERY
+            if self._translator is not None and now >= catch_up_at:
+                catch_up_at = now + CATCH_UP_EVERY
+                for role in self._translator.behind():
+                    self._catch_up(f"log/{role}", self._expected.get(f"log/{role}", ("", 0))[1])
         if self._translator is not None:
             for topic in LOGS:
                 self._catch_up(topic, self._expected.get(topic, ("", 0))[1])
             self._translator.flush(last=True)
         self._finish()
+
+    def _notice(self, what: str, role: str, ident: str) -> None:
+        """Somebody came or went: a simulation may have brought a run; the viewer's log tells of it."""
+        if what == "alive" and role == "sim":
+            self._meet()
+        if self._translator is not None and role in ROLES and role != "observer":
+            self._translator.event(f"{ident} {'is here' if what == 'alive' else 'is gone'}")
 
     def _meet(self) -> None:
         """Begin a recording if there is a run that is not yet recorded."""
