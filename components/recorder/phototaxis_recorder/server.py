@@ -6,6 +6,7 @@ from typing import Any
 
 from phototaxis.bus import Bus
 from phototaxis.messages import Decoder, LogRequest, Refused, World
+from phototaxis.recordings import Summary
 from phototaxis.topics import ROLES, TOPICS
 
 from phototaxis_recorder.translate import Translator
@@ -22,10 +23,17 @@ class Server:
     ----------
     start : called with the world of a run, begins a recording and returns its translator.
     finish : called when a recording is to be closed.
+    tell : called with the recording's summary from time to time.
     """
 
-    def __init__(self, bus: Bus, start: Callable[[World], Translator], finish: Callable[[], None]):
-        self._bus, self._start, self._finish = bus, start, finish
+    def __init__(
+        self,
+        bus: Bus,
+        start: Callable[[World], Translator],
+        finish: Callable[[], None],
+        tell: Callable[[Summary], None],
+    ):
+        self._bus, self._start, self._finish, self._tell = bus, start, finish, tell
         self._run = ""
         self._translator: Translator | None = None
         self._expected: dict[str, tuple[str, int]] = {}
@@ -49,12 +57,19 @@ class Server:
                 flush_at = now + FLUSH_EVERY
             if self._translator is not None and now >= catch_up_at:
                 catch_up_at = now + CATCH_UP_EVERY
+                self._tell(self._translator.summary)
                 for role in self._translator.behind():
                     self._catch_up(f"log/{role}", self._expected.get(f"log/{role}", ("", 0))[1])
         if self._translator is not None:
             for topic in LOGS:
                 self._catch_up(topic, self._expected.get(topic, ("", 0))[1])
+        self._close()
+
+    def _close(self) -> None:
+        """Write what waits and close the recording, if there is one."""
+        if self._translator is not None:
             self._translator.flush(last=True)
+            self._tell(self._translator.summary)
         self._finish()
 
     def _notice(self, what: str, role: str, ident: str) -> None:
@@ -69,9 +84,7 @@ class Server:
         world = self._bus.ask_one("world", World)
         if world is None or world.run == self._run:
             return
-        if self._translator is not None:
-            self._translator.flush(last=True)
-            self._finish()
+        self._close()
         self._run, self._expected = world.run, {}
         self._translator = self._start(world)
 

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
+from phototaxis.recordings import Summary
 from phototaxis.task import ACTIONS, PERCEPTS
 
 from phototaxis_recorder import policy
-from phototaxis_recorder.colors import BLUE, INK, of_distance, of_reward
+from phototaxis_recorder.colors import BLUE, of_distance, of_reward
 from phototaxis_recorder.layout import MEAN, PAPER, draw_world
 
 PATIENCE = 4000
@@ -41,6 +42,7 @@ class Translator:
         self._recent: deque[bool] = deque(maxlen=50)
         self._driver = ""
         self._rewards: deque[float] = deque(maxlen=MEAN)
+        self.summary = Summary(world.run, world.arena.name)
         draw_world(recording, world.arena)
 
     def sim(self, chunk: SimLog) -> None:
@@ -48,6 +50,8 @@ class Translator:
         self._add("sim", chunk.tick, chunk.x, chunk.y, chunk.heading)
         if chunk.driver != self._driver and chunk.tick:
             self._driver = chunk.driver
+            if self._driver and self._driver not in self.summary.drivers:
+                self.summary.drivers.append(self._driver)
             self._text(chunk.tick[0], f"{self._driver or 'nobody'} drives")
             label = rr.Points2D([(0, 0)], labels=[self._driver], colors=BLUE, radii=0.02, show_labels=True)
             rr.log("world/robot/driver", label, recording=self._recording)
@@ -112,9 +116,13 @@ class Translator:
             )
             self._at(episode.tick)
             rate = sum(self._recent) / len(self._recent)
+            self.summary.episodes, self.summary.recent = episode.episode + 1, rate
+            self.summary.reached += self._recent[-1]
             rr.log("plots/success/rate", rr.Scalars(rate), recording=self._recording)
             rr.log("plots/success/paper", rr.Scalars(PAPER), recording=self._recording)
         self._episodes.clear()
+        self.summary.tick = max(self._newest["sim"], self.summary.tick)
+        self.summary.epochs = max(self.summary.tick - self.summary.episodes, 0)
 
     def behind(self) -> list[str]:
         """The roles whose chunks do not come: Zenoh may drop them for long once a link was congested."""
@@ -162,7 +170,7 @@ class Translator:
         table, visits = np.reshape(chunk.values, (-1, len(ACTIONS))).astype(np.float32), np.array(chunk.visits)
         if math.prod(percept.sizes) == len(table) == len(visits) > 0:
             rr.log("learner/table", rr.Tensor(table, dim_names=["state", "action"]), recording=log)
-            rr.log("learner/visits", rr.BarChart(visits, color=INK), recording=log)
+            rr.log("learner/visits", rr.BarChart(visits, color=BLUE), recording=log)
             rr.log("learner/policy/frame", policy.frame(percept), static=True, recording=log)
             rr.log("learner/policy/best", policy.arrows(percept, table, visits), recording=log)
             rr.log("learner/policy/here", policy.present(percept, chunk.state[-1]), recording=log)
