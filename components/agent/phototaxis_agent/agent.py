@@ -133,6 +133,14 @@ class Agent:
             rows[number, allowed] = self.learner.values((*state, *self.learner.context))
         return rows.ravel().tolist()
 
+    def current(self) -> list[float]:
+        """Q of the present percept for each of the 9 actions; 0 where an action is not allowed."""
+        row = [0.0] * len(ACTIONS)
+        if self._state is not None:
+            for action, value in zip(self.percept.actions, self.learner.values(self._state), strict=True):
+                row[action] = value
+        return row
+
     def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
         """Everything needed to continue bit for bit."""
         arrays = {**self.learner.save()}

@@ -283,7 +283,7 @@ class Server:
         now = time.monotonic()
         if now >= self._table_at:
             self._table_at = now + TABLE_EVERY
-            log.values, log.visits = agent.table(), list(agent.visits)
+            log.values, log.visits, log.current = agent.table(), list(agent.visits), agent.current()
         return log
 
     def _say(self, text: str) -> None:

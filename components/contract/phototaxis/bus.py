@@ -170,6 +170,7 @@ class Bus:
                 key,
                 congestion_control=zenoh.CongestionControl.BLOCK if steady else zenoh.CongestionControl.DROP,
                 express=steady,
+                priority=zenoh.Priority.DATA if steady else zenoh.Priority.DATA_LOW,
             )
         if topic.kind in ("retained", "log", "query"):
             self._declared.append(self._session.declare_queryable(key, self._callback(topic.name), complete=True))

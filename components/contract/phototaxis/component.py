@@ -24,8 +24,10 @@ class ComponentOptions(BusOptions, kw_only=True):
 
     tethered: bool = False
     """end when standard input closes, so that no process outlives the one that started it"""
+    id: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    """a word in its made-up name on the bus, by which `phototaxis health` finds it"""
     ident: Annotated[str, Meta(max_length=24, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
-    """its name on the bus, which nobody else may have (default: made up)"""
+    """its whole name on the bus, which nobody else may have or have had (default: made up)"""
     restarted: bool = False
     """this process replaces one that died: continue from what that one left on disk, if anything"""
 
@@ -38,7 +40,7 @@ def run(
     SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it. With several `worlds` in
     place of `options.name`, each is served in a thread of its own; the first error ends all of them.
     """
-    ident = options.ident or made_up(label or role)
+    ident = options.ident or made_up(label or role, options.id)
     with ExitStack() as stack:
         buses: list[Bus] = []
         for name in worlds or [options.name]:
@@ -67,9 +69,9 @@ def _stop(buses: Sequence[Bus], *_: object) -> None:
         bus.stop()
 
 
-def made_up(label: str) -> str:
+def made_up(label: str, word: str = "") -> str:
     """A name on the bus that is not taken."""
-    return f"{label[:19]}-{secrets.token_hex(2)}"
+    return "-".join(filter(None, (label[:19], word, secrets.token_hex(2))))
 
 
 def _hold_tether(stop: Callable[[], None]) -> None:

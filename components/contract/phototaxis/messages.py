@@ -292,6 +292,8 @@ class AgentLog(Message):
     """At a modest rate: Q(state, action), flattened row by row, 9 actions a row; else empty."""
     visits: list[int] = field(default_factory=list)
     """With `values`: how often each state was met."""
+    current: Column = field(default_factory=list)
+    """At the same rate, for any percept: Q of the percept at the newest tick, 9 actions, 0 where not allowed."""
 
 
 class LogRequest(Message):

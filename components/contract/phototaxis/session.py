@@ -131,13 +131,13 @@ def _config(mode: str, listen: list[str], connect: list[str]) -> zenoh.Config:
                 "listen": {"endpoints": listen},
                 "connect": {
                     "endpoints": connect,
-                    "timeout_ms": -1 if mode == "peer" else 5_000,
-                    "exit_on_failure": mode != "peer",
+                    "timeout_ms": 5_000 if mode == "client" else -1,
+                    "exit_on_failure": mode == "client",
                     "retry": retry,
                 },
                 "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
                 "transport": {
-                    "unicast": {"qos": {"enabled": False}},
+                    "unicast": {"qos": {"enabled": mode != "peer"}},
                     "shared_memory": {"enabled": False},
                     "link": {"tx": {"lease": 1000, "queue": {"congestion_control": {"block": block}}}},
                 },

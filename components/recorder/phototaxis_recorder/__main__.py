@@ -11,6 +11,7 @@ from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse
+from phototaxis.recordings import write_summary
 from phototaxis.viewer import viewer_url
 
 
@@ -18,7 +19,7 @@ class Options(ComponentOptions, kw_only=True):
     """Options of the recorder."""
 
     output: str = "recording.rrd"
-    """file to record into; where it stands already, the new one gets a number"""
+    """file to record into, or a folder for RUN.rrd; where it stands already, the new one gets a number"""
     bind: str = "127.0.0.1"
     """address that the viewer's ports listen on"""
     grpc_port: Annotated[int, Meta(ge=0, le=65535)] = 9876
@@ -43,9 +44,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     grpc_port = probe(options.bind, options.grpc_port, "--grpc-port")
     web_port = probe(options.bind, options.web_port, "--web-port") if options.web_port >= 0 else -1
     recording: list[rr.RecordingStream] = []
+    file = output
 
     def start(world: World) -> Translator:
-        file = fresh_file(output)
+        nonlocal file
+        file = fresh_file(output / f"{world.run}.rrd" if output.is_dir() else output)
         recording.append(open_recording(world, file, options.bind, grpc_port, options.memory))
         return Translator(recording[0], world)
 
@@ -58,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         print(f"recorder: watch at {viewer_url(web_port, grpc_port)}", file=sys.stderr, flush=True)
 
     def serve(bus: Bus) -> None:
-        Server(bus, start, finish).serve()
+        Server(bus, start, finish, lambda summary: write_summary(file, summary)).serve()
 
     try:
         run("recorder", options, serve)

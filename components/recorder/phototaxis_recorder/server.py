@@ -6,11 +6,13 @@ from typing import Any
 
 from phototaxis.bus import Bus
 from phototaxis.messages import Decoder, LogRequest, Refused, World
-from phototaxis.topics import TOPICS
+from phototaxis.recordings import Summary
+from phototaxis.topics import ROLES, TOPICS
 
 from phototaxis_recorder.translate import Translator
 
 FLUSH_EVERY = 0.15
+CATCH_UP_EVERY = 1.0
 LOGS = ("log/sim", "log/sensors", "log/agent")
 
 
@@ -21,18 +23,28 @@ class Server:
     ----------
     start : called with the world of a run, begins a recording and returns its translator.
     finish : called when a recording is to be closed.
+    tell : called with the recording's summary from time to time.
     """
 
-    def __init__(self, bus: Bus, start: Callable[[World], Translator], finish: Callable[[], None]):
-        self._bus, self._start, self._finish = bus, start, finish
+    def __init__(
+        self,
+        bus: Bus,
+        start: Callable[[World], Translator],
+        finish: Callable[[], None],
+        tell: Callable[[Summary], None],
+    ):
+        self._bus, self._start, self._finish, self._tell = bus, start, finish, tell
         self._run = ""
         self._translator: Translator | None = None
-        self._expected: dict[str, tuple[str, int]] = {}
+        self._expected: dict[tuple[str, str], int] = {}
+        """The next chunk of each topic and writer."""
+        self._writer: dict[str, str] = {}
+        """Who wrote the newest chunk of a topic."""
         self._decoders = {name: Decoder(TOPICS[name].message, TOPICS[name].limit) for name in LOGS}
 
     def serve(self) -> None:
         """Record until a "stop" event; then take what is still to be had and close the recording."""
-        flush_at = 0.0
+        flush_at = catch_up_at = 0.0
         while True:
             event = self._bus.receive(timeout=FLUSH_EVERY)
             if event is not None:
@@ -40,27 +52,43 @@ class Server:
                     break
                 if event.topic in LOGS:
                     self._take(event.topic, event.message)
-                elif event.topic == "alive" and event.message[0] == "sim":
-                    self._meet()
+                elif event.topic in ("alive", "gone"):
+                    self._notice(event.topic, *event.message)
             now = time.monotonic()
             if self._translator is not None and now >= flush_at:
                 self._translator.flush()
                 flush_at = now + FLUSH_EVERY
+            if self._translator is not None and now >= catch_up_at:
+                catch_up_at = now + CATCH_UP_EVERY
+                self._tell(self._translator.summary)
+                for role in self._translator.behind():
+                    self._catch_up(f"log/{role}")
         if self._translator is not None:
             for topic in LOGS:
-                self._catch_up(topic, self._expected.get(topic, ("", 0))[1])
+                self._catch_up(topic)
+        self._close()
+
+    def _close(self) -> None:
+        """Write what waits and close the recording, if there is one."""
+        if self._translator is not None:
             self._translator.flush(last=True)
+            self._tell(self._translator.summary)
         self._finish()
+
+    def _notice(self, what: str, role: str, ident: str) -> None:
+        """Somebody came or went: a simulation may have brought a run; the viewer's log tells of it."""
+        if what == "alive" and role == "sim":
+            self._meet()
+        if self._translator is not None and role in ROLES and role != "observer":
+            self._translator.event(f"{ident} {'is here' if what == 'alive' else 'is gone'}")
 
     def _meet(self) -> None:
         """Begin a recording if there is a run that is not yet recorded."""
         world = self._bus.ask_one("world")
         if world is None or world.run == self._run:
             return
-        if self._translator is not None:
-            self._translator.flush(last=True)
-            self._finish()
-        self._run, self._expected = world.run, {}
+        self._close()
+        self._run, self._expected, self._writer = world.run, {}, {}
         self._translator = self._start(world)
 
     def _take(self, topic: str, chunk: Any) -> None:
@@ -69,16 +97,17 @@ class Server:
             self._meet()
             if chunk.run != self._run:
                 return
-        writer, expected = self._expected.get(topic, ("", 0))
-        if chunk.writer != writer:
-            expected = 0
-        if chunk.seq > expected:
-            self._catch_up(topic, expected)
+        if self._writer.get(topic) not in (None, chunk.writer):
+            self._catch_up(topic)  # what the former one still has comes before
+        self._writer[topic] = chunk.writer
+        if chunk.seq > self._expected.get((topic, chunk.writer), 0):
+            self._catch_up(topic)
         self._write(topic, chunk)
 
-    def _catch_up(self, topic: str, seq: int) -> None:
-        """Ask the writer for what it still has from a chunk on."""
-        for payload in self._bus.ask(topic, LogRequest(seq)):
+    def _catch_up(self, topic: str) -> None:
+        """Ask the newest writer of a topic (anybody, if none is known) for the chunks that are missing."""
+        writer = self._writer.get(topic, "")
+        for payload in self._bus.ask(topic, LogRequest(self._expected.get((topic, writer), 0), writer)):
             try:
                 self._write(topic, self._decoders[topic](payload))
             except Refused as why:
@@ -87,10 +116,9 @@ class Server:
     def _write(self, topic: str, chunk: Any) -> None:
         if chunk.run != self._run or self._translator is None:
             return
-        writer, expected = self._expected.get(topic, ("", 0))
-        if chunk.writer == writer and chunk.seq < expected:
+        if chunk.seq < self._expected.get((topic, chunk.writer), 0):
             return
-        self._expected[topic] = chunk.writer, chunk.seq + 1
+        self._expected[topic, chunk.writer] = chunk.seq + 1
         {
             "log/sim": self._translator.sim,
             "log/sensors": self._translator.sensors,

@@ -10,12 +10,17 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
+from phototaxis.recordings import Summary
 from phototaxis.task import ACTIONS, PERCEPTS
 
-from phototaxis_recorder.layout import draw_world
+from phototaxis_recorder import policy
+from phototaxis_recorder.colors import BLUE, of_distance, of_reward
+from phototaxis_recorder.layout import MEAN, PAPER, draw_world
 
 PATIENCE = 4000
-"""Rows of one role that may wait for the other's."""
+"""Rows of one role that may wait for another's."""
+BEHIND = 64
+"""A role this many ticks behind the newest is not waited for, but asked."""
 WORDS = {"reached": "reached the light", "cap": "gave up", "asked": "was reset"}
 
 
@@ -36,6 +41,8 @@ class Translator:
         self._episode = -1
         self._recent: deque[bool] = deque(maxlen=50)
         self._driver = ""
+        self._rewards: deque[float] = deque(maxlen=MEAN)
+        self.summary = Summary(world.run, world.arena.name)
         draw_world(recording, world.arena)
 
     def sim(self, chunk: SimLog) -> None:
@@ -43,7 +50,11 @@ class Translator:
         self._add("sim", chunk.tick, chunk.x, chunk.y, chunk.heading)
         if chunk.driver != self._driver and chunk.tick:
             self._driver = chunk.driver
+            if self._driver and self._driver not in self.summary.drivers:
+                self.summary.drivers.append(self._driver)
             self._text(chunk.tick[0], f"{self._driver or 'nobody'} drives")
+            label = rr.Points2D([(0, 0)], labels=[self._driver], colors=BLUE, radii=0.02, show_labels=True)
+            rr.log("world/robot/driver", label, recording=self._recording)
         self._episodes += [episode for episode in chunk.ended if episode.episode > self._episode]
         if self._episodes:
             self._episode = self._episodes[-1].episode
@@ -56,34 +67,41 @@ class Translator:
     def agent(self, chunk: AgentLog) -> None:
         """Percepts, rewards and what is learned."""
         self._add("agent", chunk.tick, chunk.reward, chunk.td_error, chunk.temperature, chunk.action)
-        if chunk.values:
+        if chunk.current:
             self._learned(chunk)
 
     def flush(self, last: bool = False) -> None:
-        """Write what is buffered, up to the newest tick of which both pose and rays are known.
+        """Write what is buffered, up to the newest tick of which pose, rays and reward are known.
 
-        So the newest picture is of one moment. The rest waits for the other role, unless this is the
+        So the newest picture is of one moment. The rest waits for the other roles, unless this is the
         `last` flush or too much is waiting.
         """
         waiting = max(map(len, self._rows.values()))
-        until = math.inf if last or waiting > PATIENCE else min(self._newest["sim"], self._newest["sensors"])
+        known = min(self._newest["sim"], self._newest["sensors"])
+        if known - self._newest["agent"] <= BEHIND:
+            known = min(known, self._newest["agent"])
+        until = math.inf if last or waiting > PATIENCE else known
+        agent = self._take("agent", until)
         if rows := self._take("sim", until):
             tick, x, y, heading = rows
             place = np.stack([x, y, np.zeros_like(x)], axis=1)
             turn = np.zeros((len(tick), 4))
             turn[:, 2], turn[:, 3] = np.sin(heading / 2), np.cos(heading / 2)
             self._send("world/robot", tick, rr.Transform3D.columns(translation=place, quaternion=turn))
-            self._send("world/trail", tick, rr.Points2D.columns(positions=place[:, :2]))
+            colors = of_reward(_at(tick, agent[0], agent[1])) if agent else of_reward(np.full(len(tick), np.nan))
+            self._send("world/trail", tick, rr.Points2D.columns(positions=place[:, :2], colors=colors))
         if rows := self._take("sensors", until):
             tick, sonar, light = rows
             rays = (sonar[:, :, None] * self._aim).reshape(-1, 2)
             starts = np.tile(self._mounts, (len(tick), 1))
-            arrows = rr.Arrows2D.columns(vectors=rays, origins=starts).partition([16] * len(tick))
+            arrows = rr.Arrows2D.columns(vectors=rays, origins=starts, colors=of_distance(sonar.ravel()))
+            arrows = arrows.partition([16] * len(tick))
             self._send("world/robot/sonar", tick, arrows)
             self._send("plots/light/left", tick, rr.Scalars.columns(scalars=light[:, 0]))
             self._send("plots/light/right", tick, rr.Scalars.columns(scalars=light[:, 1]))
-        if rows := self._take("agent", until):
-            tick, reward, error, temperature, action = rows
+        if agent:
+            tick, reward, error, temperature, action = agent
+            self._send("plots/mean_reward", tick, rr.Scalars.columns(scalars=self._running_mean(reward)))
             self._send("plots/reward", tick, rr.Scalars.columns(scalars=reward))
             self._send("plots/td_error", tick, rr.Scalars.columns(scalars=error))
             self._send("plots/temperature", tick, rr.Scalars.columns(scalars=temperature))
@@ -98,8 +116,30 @@ class Translator:
             )
             self._at(episode.tick)
             rate = sum(self._recent) / len(self._recent)
-            rr.log("plots/success", rr.Scalars(rate), recording=self._recording)
+            self.summary.episodes, self.summary.recent = episode.episode + 1, rate
+            self.summary.reached += self._recent[-1]
+            rr.log("plots/success/rate", rr.Scalars(rate), recording=self._recording)
+            rr.log("plots/success/paper", rr.Scalars(PAPER), recording=self._recording)
         self._episodes.clear()
+        self.summary.tick = max(self._newest["sim"], self.summary.tick)
+        self.summary.epochs = max(self.summary.tick - self.summary.episodes, 0)
+
+    def behind(self) -> list[str]:
+        """The roles whose chunks do not come: Zenoh may drop them for long once a link was congested."""
+        newest = max(self._newest.values())
+        return [role for role, tick in self._newest.items() if newest - tick > BEHIND]
+
+    def event(self, text: str) -> None:
+        """Something that happened to the system, told at the newest tick."""
+        self._text(max(*self._newest.values(), 0), text, rr.TextLogLevel.WARN)
+
+    def _running_mean(self, rewards: np.ndarray) -> np.ndarray:
+        """The mean of the last MEAN rewards at each of the new ones."""
+        means = []
+        for reward in rewards:
+            self._rewards.append(float(reward))
+            means.append(sum(self._rewards) / len(self._rewards))
+        return np.array(means)
 
     def _add(self, role: str, ticks: Sequence[int], *columns: Sequence[Any] | np.ndarray) -> None:
         newest = self._newest[role]
@@ -124,17 +164,27 @@ class Translator:
 
     def _learned(self, chunk: AgentLog) -> None:
         self._at(chunk.tick[-1])
-        table = np.reshape(chunk.values, (-1, len(ACTIONS))).astype(np.float32)
-        sizes = PERCEPTS[chunk.percept].sizes
-        if math.prod(sizes) == len(table):
-            log = self._recording
+        log, percept = self._recording, PERCEPTS[chunk.percept]
+        if len(chunk.current) == len(ACTIONS):
+            rr.log("learner/current", rr.BarChart(np.array(chunk.current), color=BLUE), recording=log)
+        table, visits = np.reshape(chunk.values, (-1, len(ACTIONS))).astype(np.float32), np.array(chunk.visits)
+        if math.prod(percept.sizes) == len(table) == len(visits) > 0:
             rr.log("learner/table", rr.Tensor(table, dim_names=["state", "action"]), recording=log)
-            rr.log("learner/visits", rr.BarChart(np.array(chunk.visits)), recording=log)
+            rr.log("learner/visits", rr.BarChart(visits, color=BLUE), recording=log)
+            rr.log("learner/policy/frame", policy.frame(percept), static=True, recording=log)
+            rr.log("learner/policy/best", policy.arrows(percept, table, visits), recording=log)
+            rr.log("learner/policy/here", policy.present(percept, chunk.state[-1]), recording=log)
 
-    def _text(self, tick: int, text: str) -> None:
+    def _text(self, tick: int, text: str, level: str = rr.TextLogLevel.INFO) -> None:
         self._at(tick)
-        rr.log("episodes", rr.TextLog(text), recording=self._recording)
+        rr.log("episodes", rr.TextLog(text, level=level), recording=self._recording)
 
     def _at(self, tick: int) -> None:
         self._recording.set_time("tick", sequence=tick)
         self._recording.set_time("sim_time", duration=tick * self._period)
+
+
+def _at(wanted: np.ndarray, tick: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """The values at the wanted ticks (both ascending); NaN where there is none."""
+    place = np.minimum(np.searchsorted(tick, wanted), len(tick) - 1)
+    return np.where(tick[place] == wanted, values[place], np.nan)

@@ -1,0 +1,113 @@
+"""`phototaxis view`: the live view or a finished recording, in the native viewer or in the browser."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+from phototaxis.errors import ComponentFailed, Unavailable, UserError
+from phototaxis.options import parse
+from phototaxis.recordings import recordings
+from phototaxis.viewer import viewer_url
+
+PORT = Annotated[int, Meta(ge=1, le=65535)]
+
+
+class Options(msgspec.Struct, kw_only=True):
+    """Options of `phototaxis view`."""
+
+    run: str = ""
+    """a recording (.rrd), a run in --out, or "last"; nothing: what is being recorded now"""
+    out: str = "runs"
+    """folder of the runs"""
+    web: bool = False
+    """in the browser; so too where there is no display"""
+    grpc_port: PORT = 9876
+    """the recorder's port, for the live view; with a RUN in the browser, the port that serves it"""
+    web_port: PORT = 9090
+    """the port of the web viewer"""
+
+
+def main(argv: Sequence[str]) -> int:
+    words = list(argv)
+    run = [words.pop(0)] if words and not words[0].startswith("-") else []
+    about = "Open the live view, or with RUN (a file, a run's name, or last) a recording, in the same layout."
+    options = parse(Options, [*(f"--run={name}" for name in run), *words], "phototaxis view", about)
+    web = options.web or not has_display()
+    if options.run:
+        return show(str(find(options.run, Path(options.out))), options, web)
+    try:
+        socket.create_connection(("127.0.0.1", options.grpc_port), timeout=2).close()
+    except OSError:
+        raise Unavailable(
+            f"nothing is being recorded on port {options.grpc_port}; start a run with: phototaxis up, "
+            "or look at a finished one with: phototaxis view last"
+        ) from None
+    if web:
+        print(viewer_url(options.web_port, options.grpc_port))
+        return 0
+    return native("--connect", f"rerun+http://127.0.0.1:{options.grpc_port}/proxy")
+
+
+def has_display() -> bool:
+    """Whether a native window can be opened here."""
+    return sys.platform == "darwin" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
+def find(run: str, folder: Path) -> Path:
+    """The recording that a person means.
+
+    Raises
+    ------
+    UserError
+        when there is none.
+    """
+    if run.endswith(".rrd"):
+        if Path(run).is_file():
+            return Path(run)
+        raise UserError(f"{run}: there is no such file")
+    found = recordings(folder) if folder.is_dir() else []
+    for recording in found:
+        names = {recording.file.stem, recording.file.parent.name, recording.summary.run if recording.summary else ""}
+        if run == "last" or run in names:
+            return recording.file
+    raise UserError(f"no recording of a run '{run}' in {folder}; see: phototaxis recordings --out {folder}")
+
+
+def show(file: str, options: Options, web: bool) -> int:
+    """A finished recording, until Ctrl-C or until the window is closed."""
+    if not web:
+        return native(file)
+    for port, flag in ((options.grpc_port, "--grpc-port"), (options.web_port, "--web-port")):
+        try:
+            socket.create_server(("127.0.0.1", port)).close()
+        except OSError:
+            raise Unavailable(f"port {port} on 127.0.0.1 is not free; choose another with {flag}") from None
+    print(f"{file}: look at {viewer_url(options.web_port, options.grpc_port)} (Ctrl-C ends)", file=sys.stderr)
+    ports = ("--port", str(options.grpc_port), "--web-viewer-port", str(options.web_port))
+    return native("--serve-web", "--bind", "127.0.0.1", *ports, file)
+
+
+def native(*words: str) -> int:
+    """Run Rerun's program; the script of the same name would leave it an orphan."""
+    import rerun_cli
+
+    program = Path(rerun_cli.__file__).parent / "rerun"
+    viewer = subprocess.Popen([program, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    signal.signal(signal.SIGTERM, lambda *_: viewer.terminate())
+    try:
+        _, errors = viewer.communicate()
+    except KeyboardInterrupt:
+        viewer.terminate()
+        viewer.communicate()
+        return 0
+    if viewer.returncode not in (0, -signal.SIGTERM):
+        last = (errors.strip().splitlines() or ["without a word"])[-1]
+        raise ComponentFailed(f"the Rerun viewer ended with {viewer.returncode}: {last}")
+    return 0

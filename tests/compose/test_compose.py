@@ -1,0 +1,126 @@
+"""docker compose for real: it comes up, answers where it says, survives kills, swaps the learner, leaves nothing."""
+
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+from engine import DEADLINE, System, docker
+from phototaxis.errors import Unavailable
+from phototaxis.messages import Status
+from rerun.chunk import RrdReader
+
+RERUN = Path(sys.executable).with_name("rerun")
+ROLES = {"sim", "sensors", "agent", "recorder"}
+SERVICES = ("router", *sorted(ROLES))
+
+
+def test_it_comes_up_healthy_and_ticks(system: System, capsys: pytest.CaptureFixture[str]):
+    sizes = docker("images", "--filter", "reference=phototaxis-*:test", "--format", "{{.Repository}} {{.Size}}")
+    with capsys.disabled():
+        print(f"\n{sizes}" + "\n".join(f"{what}: {seconds:.1f} s" for what, seconds in system.figures.items()))
+    with system.bus() as bus:
+        for service in SERVICES:
+            assert system.inspect(service)["State"]["Health"]["Status"] == "healthy"
+        first = system.until(bus, lambda status: status.phase == "running")
+        later = system.until(bus, lambda status: status.tick > first.tick + 100)
+    assert complete(later)
+    assert later.driver.startswith("qtable-")
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_least_rights(system: System, service: str):
+    found = system.inspect(service)
+    host = found["HostConfig"]
+    assert found["Config"]["User"] == "10001:10001"
+    assert host["ReadonlyRootfs"]
+    assert not host["Privileged"]
+    assert host["CapDrop"] == ["ALL"]
+    assert {place["HostIp"] for bindings in (host["PortBindings"] or {}).values() for place in bindings} <= {
+        "127.0.0.1"
+    }
+    script = "id -u; touch /opt/x 2>/dev/null && echo writable || echo read-only"
+    assert system.compose("exec", "-T", service, "/bin/sh", "-c", script).split() == ["10001", "read-only"]
+
+
+def test_the_page_and_the_stream_answer_on_the_published_ports(system: System, tmp_path: Path):
+    page = urllib.request.urlopen(f"http://127.0.0.1:{system.web_port}/", timeout=10)
+    assert b"rerun" in page.read().lower()
+    file = tmp_path / "live.rrd"
+    source = f"rerun+http://127.0.0.1:{system.grpc_port}/proxy"
+    with system.bus() as bus:
+        now = system.until(bus, lambda status: status.phase == "running")
+        viewer = subprocess.Popen([RERUN, "--save", file, source], stderr=subprocess.PIPE)
+        try:
+            deadline = time.monotonic() + DEADLINE
+            while newest_tick(file) < now.tick:
+                assert time.monotonic() < deadline, f"newest tick {newest_tick(file)} of {now.tick}"
+                assert viewer.poll() is None, viewer.communicate()
+                bus.receive(timeout=0.5)
+        finally:
+            viewer.terminate()
+            viewer.communicate()
+
+
+def newest_tick(file: Path) -> int:
+    """The newest pose in a file that is being written; −1 before there is one."""
+    ticks = [-1]
+    try:
+        for chunk in RrdReader(file).stream():
+            if str(chunk.entity_path) == "/world/robot" and not chunk.is_static:
+                ticks += chunk.to_record_batch()["tick"].to_pylist()
+    except Exception:  # noqa: S110 - it ends in the middle of a message
+        pass
+    return max(ticks)
+
+
+@pytest.mark.parametrize("service", ["sensors", "agent", "recorder", "router", "sim"])
+def test_what_is_killed_comes_back_and_the_run_goes_on(system: System, service: str):
+    with system.bus() as bus:
+        before = system.until(bus, lambda status: status.phase == "running")
+    container = system.inspect(service)
+    system.compose("exec", "-T", service, "/bin/sh", "-c", "kill -9 -1")  # everything in it but the init
+    deadline = time.monotonic() + DEADLINE
+    while (found := system.inspect(service))["State"]["StartedAt"] == container["State"]["StartedAt"]:
+        assert time.monotonic() < deadline, found["State"]
+    assert found["RestartCount"] == container["RestartCount"] + 1
+    assert found["Id"] == container["Id"]
+    while True:
+        try:
+            with system.bus() as bus:
+                system.healthy(bus, service)
+                after = system.until(bus, lambda status: complete(status) and status.tick > before.tick)
+                break
+        except Unavailable:
+            assert time.monotonic() < deadline
+    assert after.run == before.run
+
+
+def complete(status: Status) -> bool:
+    """The run goes on with all its components."""
+    return status.phase == "running" and {who.split("/")[0] for who in status.alive} >= ROLES
+
+
+def test_another_learner_takes_the_seat(system: System):
+    with system.bus() as bus:
+        before = system.until(bus, lambda status: status.driver.startswith("qtable-"))
+        system.compose("up", "-d", "--wait", "agent-ann")
+        after = system.until(bus, lambda status: status.driver.startswith("ann-") and status.phase == "running")
+        later = system.until(bus, lambda status: status.tick > after.tick + 20)
+        deadline = time.monotonic() + DEADLINE
+        while (old := system.inspect("agent")["State"])["Running"]:
+            assert time.monotonic() < deadline
+            bus.receive(timeout=0.2)
+        assert old["ExitCode"] == 0  # it has handed over and left
+    assert later.run == before.run
+    assert later.driver == after.driver
+    assert [one.how for one in later.drivers][-1] == "took over"
+
+
+def test_down_leaves_nothing(system: System):
+    system.compose("--profile", "ann", "down", "--volumes")
+    label = f"label=com.docker.compose.project={system.name}"
+    for what in (["ps", "-a"], ["network", "ls"], ["volume", "ls"]):
+        assert docker(*what, "-q", "--filter", label) == ""
