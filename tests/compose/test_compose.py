@@ -18,7 +18,7 @@ SERVICES = ("router", *sorted(ROLES))
 
 
 def test_it_comes_up_healthy_and_ticks(system: System, capsys: pytest.CaptureFixture[str]):
-    sizes = docker("images", "--filter", "reference=phototaxis-*:test", "--format", "{{.Repository}} {{.Size}}")
+    sizes = docker("images", "--filter", f"reference=phototaxis-*:{system.name}", "--format", "{{.Repository}} {{.Size}}")
     with capsys.disabled():
         print(f"\n{sizes}" + "\n".join(f"{what}: {seconds:.1f} s" for what, seconds in system.figures.items()))
     with system.bus() as bus:
