@@ -1,7 +1,6 @@
 """docker compose for real: it comes up, answers where it says, survives kills, swaps the learner, leaves nothing."""
 
 import subprocess
-import sys
 import time
 import urllib.request
 from pathlib import Path
@@ -10,9 +9,8 @@ import pytest
 from engine import DEADLINE, System, docker
 from phototaxis.errors import Unavailable
 from phototaxis.messages import Status
-from rerun.chunk import RrdReader
+from rerun_files import RERUN, newest_tick
 
-RERUN = Path(sys.executable).with_name("rerun")
 ROLES = {"sim", "sensors", "agent", "recorder"}
 SERVICES = ("router", *sorted(ROLES))
 
@@ -55,25 +53,13 @@ def test_the_page_and_the_stream_answer_on_the_published_ports(system: System, t
         viewer = subprocess.Popen([RERUN, "--save", file, source], stderr=subprocess.PIPE)
         try:
             deadline = time.monotonic() + DEADLINE
-            while newest_tick(file) < now.tick:
-                assert time.monotonic() < deadline, f"newest tick {newest_tick(file)} of {now.tick}"
+            while (newest := newest_tick(file)) < now.tick:
+                assert time.monotonic() < deadline, f"newest tick {newest} of {now.tick}"
                 assert viewer.poll() is None, viewer.communicate()
                 bus.receive(timeout=0.5)
         finally:
             viewer.terminate()
             viewer.communicate()
-
-
-def newest_tick(file: Path) -> int:
-    """The newest pose in a file that is being written; −1 before there is one."""
-    ticks = [-1]
-    try:
-        for chunk in RrdReader(file).stream():
-            if str(chunk.entity_path) == "/world/robot" and not chunk.is_static:
-                ticks += chunk.to_record_batch()["tick"].to_pylist()
-    except Exception:  # noqa: S110 - it ends in the middle of a message
-        pass
-    return max(ticks)
 
 
 @pytest.mark.parametrize("service", ["sensors", "agent", "recorder", "router", "sim"])

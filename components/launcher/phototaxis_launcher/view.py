@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -41,7 +42,8 @@ def main(argv: Sequence[str]) -> int:
     options = parse(Options, [*(f"--run={name}" for name in run), *words], "phototaxis view", about)
     web = options.web or not has_display()
     if options.run:
-        return show(str(find(options.run, Path(options.out))), options, web)
+        with tempfile.TemporaryDirectory(prefix="phototaxis-") as folder:
+            return show(str(whole(find(options.run, Path(options.out)), Path(folder))), options, web)
     try:
         socket.create_connection(("127.0.0.1", options.grpc_port), timeout=2).close()
     except OSError:
@@ -80,6 +82,26 @@ def find(run: str, folder: Path) -> Path:
     raise UserError(f"no recording of a run '{run}' in {folder}; see: phototaxis recordings --out {folder}")
 
 
+def whole(file: Path, folder: Path) -> Path:
+    """The recording itself, or where its recorder was killed or still writes, a copy of all that can be read of it."""
+    rrd = [rerun(), "rrd"]
+    if subprocess.run([*rrd, "verify", file], capture_output=True, check=False).returncode == 0:
+        return file
+    copy = folder / file.name
+    with copy.open("wb") as out:
+        done = subprocess.run([*rrd, "merge", "--continue-on-error", file], stdout=out, stderr=subprocess.DEVNULL)
+    if done.returncode or not copy.stat().st_size:
+        raise UserError(f"{file}: not a recording that can be read")
+    return copy
+
+
+def rerun() -> Path:
+    """Rerun's own program; the script of the same name would leave it an orphan."""
+    import rerun_cli
+
+    return Path(rerun_cli.__file__).parent / "rerun"
+
+
 def show(file: str, options: Options, web: bool) -> int:
     """A finished recording, until Ctrl-C or until the window is closed."""
     if not web:
@@ -95,11 +117,8 @@ def show(file: str, options: Options, web: bool) -> int:
 
 
 def native(*words: str) -> int:
-    """Run Rerun's program; the script of the same name would leave it an orphan."""
-    import rerun_cli
-
-    program = Path(rerun_cli.__file__).parent / "rerun"
-    viewer = subprocess.Popen([program, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    """Run Rerun's program until it ends, or Ctrl-C."""
+    viewer = subprocess.Popen([rerun(), *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     signal.signal(signal.SIGTERM, lambda *_: viewer.terminate())
     try:
         _, errors = viewer.communicate()
