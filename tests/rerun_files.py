@@ -1,13 +1,14 @@
 """Reading recordings back, also those that nobody closed."""
 
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
+import rerun_cli
 from rerun.chunk import RrdReader
 
-RERUN = str(Path(sys.executable).with_name("rerun"))
+RERUN = str(Path(rerun_cli.__file__).parent / "rerun")
+"""The program itself: the script of that name would leave it an orphan."""
 
 
 def series(file: str | Path, entity: str, component: str) -> dict[int, Any]:

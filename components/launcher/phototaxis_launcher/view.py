@@ -29,6 +29,10 @@ class Options(msgspec.Struct, kw_only=True):
     """folder of the runs"""
     web: bool = False
     """in the browser; so too where there is no display"""
+    picture: str = ""
+    """without a display, write what the viewer shows into this file: .png, or .gif for an animation"""
+    seconds: Annotated[float, Meta(ge=1, le=60)] = 5.0
+    """when the picture is taken, and how long the animation is"""
     grpc_port: PORT = 9876
     """the recorder's port, for the live view; with a RUN in the browser, the port that serves it"""
     web_port: PORT = 9090
@@ -40,6 +44,8 @@ def main(argv: Sequence[str]) -> int:
     run = [words.pop(0)] if words and not words[0].startswith("-") else []
     about = "Open the live view, or with RUN (a file, a run's name, or last) a recording, in the same layout."
     options = parse(Options, [*(f"--run={name}" for name in run), *words], "phototaxis view", about)
+    if options.picture and Path(options.picture).suffix not in (".png", ".gif"):
+        raise UserError(f"--picture {options.picture}: it must end in .png or .gif")
     web = options.web or not has_display()
     if options.run:
         with tempfile.TemporaryDirectory(prefix="phototaxis-") as folder:
@@ -51,6 +57,8 @@ def main(argv: Sequence[str]) -> int:
             f"nothing is being recorded on port {options.grpc_port}; start a run with: phototaxis up, "
             "or look at a finished one with: phototaxis view last"
         ) from None
+    if options.picture:
+        return draw(f"rerun+http://127.0.0.1:{options.grpc_port}/proxy", options)
     if web:
         print(viewer_url(options.web_port, options.grpc_port))
         return 0
@@ -87,11 +95,14 @@ def whole(file: Path, folder: Path) -> Path:
     rrd = [rerun(), "rrd"]
     if subprocess.run([*rrd, "verify", file], capture_output=True, check=False).returncode == 0:
         return file
+    with file.open("rb") as found:
+        if not found.read(3) == b"RRF":
+            raise UserError(f"{file}: not a Rerun recording")
     copy = folder / file.name
     with copy.open("wb") as out:
         done = subprocess.run([*rrd, "merge", "--continue-on-error", file], stdout=out, stderr=subprocess.DEVNULL)
-    if done.returncode or not copy.stat().st_size:
-        raise UserError(f"{file}: not a recording that can be read")
+    if done.returncode:
+        raise UserError(f"{file}: nothing of this recording can be read")
     return copy
 
 
@@ -104,6 +115,8 @@ def rerun() -> Path:
 
 def show(file: str, options: Options, web: bool) -> int:
     """A finished recording, until Ctrl-C or until the window is closed."""
+    if options.picture:
+        return draw(file, options)
     if not web:
         return native(file)
     for port, flag in ((options.grpc_port, "--grpc-port"), (options.web_port, "--web-port")):
@@ -114,6 +127,14 @@ def show(file: str, options: Options, web: bool) -> int:
     print(f"{file}: look at {viewer_url(options.web_port, options.grpc_port)} (Ctrl-C ends)", file=sys.stderr)
     ports = ("--port", str(options.grpc_port), "--web-viewer-port", str(options.web_port))
     return native("--serve-web", "--bind", "127.0.0.1", *ports, file)
+
+
+def draw(source: str, options: Options) -> int:
+    """The picture that is asked for."""
+    from phototaxis_launcher.headless import picture
+
+    picture(source, Path(options.picture), options.seconds)
+    return 0
 
 
 def native(*words: str) -> int:
