@@ -93,11 +93,16 @@ def test_another_learner_takes_the_seat(system: System):
     with system.bus() as bus:
         before = system.until(bus, lambda status: status.driver.startswith("qtable-"))
         system.compose("up", "-d", "--wait", "agent-ann")
-        system.compose("stop", "agent")
         after = system.until(bus, lambda status: status.driver.startswith("ann-") and status.phase == "running")
         later = system.until(bus, lambda status: status.tick > after.tick + 20)
+        deadline = time.monotonic() + DEADLINE
+        while (old := system.inspect("agent")["State"])["Running"]:
+            assert time.monotonic() < deadline
+            bus.receive(timeout=0.2)
+        assert old["ExitCode"] == 0  # it has handed over and left
     assert later.run == before.run
     assert later.driver == after.driver
+    assert [one.how for one in later.drivers][-1] == "took over"
 
 
 def test_down_leaves_nothing(system: System):

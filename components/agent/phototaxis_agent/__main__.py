@@ -11,35 +11,49 @@ from phototaxis.errors import UserError
 from phototaxis.messages import World
 
 from phototaxis_agent.agent import Agent
-from phototaxis_agent.server import Server
+from phototaxis_agent.server import Mode, Server
 from phototaxis_agent.setup import parse_setup
 
 
 class Options(ComponentOptions, kw_only=True):
     """Options of the agent process."""
 
+    worlds: Annotated[str, Meta(pattern=r"^([A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*)?$")] = ""
+    """in place of --name: several worlds, separated by commas, each driven by an agent of its own in this process"""
     checkpoint: str = ""
-    """file to keep the learner's state in (.npz)"""
+    """file to keep the learner's state in (.npz); with --worlds a folder, in it WORLD.npz"""
     resume: str = ""
     """checkpoint to begin with"""
+    take_over: bool = False
+    """take the seat from whoever drives, at the next tick boundary, and leave when a successor drives"""
+    at: Annotated[int, Meta(ge=0)] = 0
+    """with --take-over: not before this tick"""
+    standby: bool = False
+    """drive when the driver vanishes; until then keep in step with it, or learn from what it does"""
     agent_seed: Annotated[int, Meta(ge=0)] | None = None
     """seed of the learner and its exploration (default: the run's)"""
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     options, setup = parse_setup(Options, argv, "phototaxis agent", "Run a learner that drives the robot.")
-    path = Path(options.checkpoint) if options.checkpoint else None
-    if path is not None and not path.parent.is_dir():
-        raise UserError(f"--checkpoint {path}: there is no folder {path.parent}")
-    resume = Path(options.resume) if options.resume else path if options.restarted else None
+    worlds = options.worlds.split(",") if options.worlds else []
+    kept = Path(options.checkpoint) if options.checkpoint else None
+    folder = kept if kept is None or worlds else kept.parent
+    if folder is not None and not folder.is_dir():
+        raise UserError(f"--checkpoint {kept}: there is no folder {folder}")
+    if options.take_over and options.standby:
+        raise UserError("--take-over and --standby exclude each other")
+    mode: Mode = "take over" if options.take_over else "stand by" if options.standby else "claim"
 
     def make(world: World) -> Agent:
         return setup.agent(world, seed=options.agent_seed)
 
     def serve(bus: Bus) -> None:
-        Server(bus, make, path, resume, required=bool(options.resume)).serve()
+        path = kept / f"{bus.name}.npz" if kept is not None and worlds else kept
+        resume = Path(options.resume) if options.resume else path if options.restarted else None
+        Server(bus, make, path, resume, bool(options.resume), mode, options.at).serve()
 
-    run("agent", options, serve, label=setup.learner)
+    run("agent", options, serve, setup.learner, worlds)
 
 
 if __name__ == "__main__":

@@ -76,6 +76,8 @@ class Agent:
         self._run, self._tick, self._episode, self._steps = "", -1, -1, 0
         self._state: State | None = None
         self._linked = False
+        self.command: Command | None = None
+        """The answer to the last tick."""
 
     def __call__(self, readings: Readings) -> Command:
         """Answer one tick: perceive, learn from the last action, choose the next."""
@@ -112,7 +114,8 @@ class Agent:
             action = self.percept.actions[draw(self.learner.values(state), temperature, self._rng.random())]
             left, right = ACTIONS[action]
         self.last = Step(number, action, reward, error, temperature)
-        return Command(readings.run, readings.tick, self.author, left, right, end)
+        self.command = Command(readings.run, readings.tick, self.author, left, right, end)
+        return self.command
 
     def _visit(self, state: State) -> int:
         """The number of a percept's state, counted as met; 0 where states are real numbers."""
@@ -141,7 +144,7 @@ class Agent:
     def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
         """Everything needed to continue bit for bit."""
         arrays = {**self.learner.save()}
-        digest = learner_hash(arrays)
+        digest, command = learner_hash(arrays), self.command
         meta = Meta(
             learner=self.name,
             percept=self.task.percept,
@@ -158,6 +161,7 @@ class Agent:
             lights=list(self._memory.lights),
             state=self._state or (),
             linked=self._linked,
+            answer=None if command is None else (command.left, command.right, command.end),
             random=_map_numbers(str, self._rng.bit_generator.state),
             visits=list(self.visits),
             arena=self.arena,
@@ -202,6 +206,7 @@ class Agent:
         self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
         self._memory.lights.extend(meta.lights)
         self._state, self._linked = meta.state or None, meta.linked
+        self.command = None if meta.answer is None else Command(meta.run, meta.tick, self.author, *meta.answer)
 
     @property
     def tick(self) -> tuple[str, int]:

@@ -1,16 +1,27 @@
-"""The agent on the bus: takes the seat, answers readings with commands, keeps itself on disk."""
+"""The agent on the bus: takes the seat, answers readings with commands, hands over, keeps itself on disk."""
 
+import sys
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal
 
 import msgspec
-from phototaxis.bus import Bus
-from phototaxis.checkpoint import load, save
+from phototaxis.bus import Bus, Event
+from phototaxis.checkpoint import decode, encode, load, save
 from phototaxis.chunks import Chunks
+from phototaxis.errors import UserError
 from phototaxis.journal import Journal
-from phototaxis.messages import AgentLog, Command, Control, Readings, World
+from phototaxis.messages import (
+    AgentLog,
+    CheckpointReply,
+    CheckpointRequest,
+    Command,
+    Control,
+    Readings,
+    World,
+)
 from phototaxis.protocol import Once
 
 from phototaxis_agent.agent import Agent
@@ -18,9 +29,15 @@ from phototaxis_agent.agent import Agent
 TABLE_EVERY = 0.5
 SAVE_EVERY = 10.0
 CLAIM_EVERY = 0.2
+INHERIT_WITHIN = 4.0
+"""Seconds that a predecessor gets to hand over what it knows."""
+
+Mode = Literal["claim", "take over", "stand by"]
+"""How the seat is sought: when it is free; from whoever holds it; when its holder vanishes."""
 
 
-class Session(NamedTuple):
+@dataclass
+class Session:
     """The agent in one run."""
 
     world: World
@@ -37,52 +54,156 @@ class Server:
     path : checkpoint to write; beside it, `.journal` holds the readings since. None: nothing is kept.
     resume : checkpoint to begin with, if it exists (`required`: it must). When it is of the run on the
         bus, the readings in the journal are gone through again, so that the agent is where it was killed.
+    mode, at : how the seat is sought, and from which tick on it is taken over.
+
+    Who waits for the seat of an agent of its own kind (the same learner and percept) inherits from it: a
+    standby at once, and then keeps in step with it; a taker-over when it sits down. Behind an agent of
+    another kind it learns from what that one does.
     """
 
     def __init__(
-        self, bus: Bus, make: Callable[[World], Agent], path: Path | None, resume: Path | None, required: bool
+        self,
+        bus: Bus,
+        make: Callable[[World], Agent],
+        path: Path | None,
+        resume: Path | None,
+        required: bool,
+        mode: Mode = "claim",
+        at: int = 0,
     ):
         self._bus, self._make, self._path, self._resume, self._required = bus, make, path, resume, required
+        self._mode: Mode = mode
+        self._at = at
         self._journal = None if path is None else Journal(path.with_suffix(".journal"))
         self._session: Session | None = None
+        self._driving = self._seated = self._replaced = self._enlisted = False
+        self._leader = self._predecessor = ""
+        """The driver that is followed; the last one that was seen."""
+        self._related = self._in_step = False
+        """Whether it is of the same kind; whether this agent is what it is."""
         self._save_at = self._table_at = self._claim_at = 0.0
         self._saved: tuple[str, int] = ("", -1)
         self._log = Chunks(bus, "log/agent", self._chunk)
 
     def serve(self) -> None:
-        """Drive until a "stop" event, then leave the seat and save."""
-        while True:
-            event = self._bus.receive(timeout=0.05)
-            if event is None:
-                self._log.poll(time.monotonic())
-            elif event.topic == "readings":
-                self._readings(event.message)
-            elif event.topic == "log/agent":
-                self._log.answer(event)
-            elif event.topic == "stop":
-                break
+        """Drive, or wait for the seat, until a "stop" event or until a successor drives; leave the seat and save."""
+        while not self._replaced and self._handle(self._bus.receive(timeout=0.05)):
+            pass
         self._log.flush()
         if self._session is not None:
             self._bus.control(Control("release", self._bus.ident), timeout=0.5)
             self._save(self._session.agent)
+
+    def _handle(self, event: Event | None) -> bool:
+        """Do what one event asks for; False when it is to stop."""
+        if event is None:
+            self._log.poll(time.monotonic())
+        elif event.topic == "readings":
+            self._readings(event.message)
+        elif event.topic == "log/agent":
+            self._log.answer(event)
+        elif event.topic == "checkpoint":
+            self._bequeath(event)
+        elif event.topic == "alive" and event.message[0] == "sim":
+            self._enlisted = False  # a simulation that is back knows nothing of who waits for its seat
+        return event is None or event.topic != "stop"
 
     def _readings(self, readings: Readings) -> None:
         session = self._meet(readings.run)
         if session is None:
             return
         if readings.driver == self._bus.ident:
+            if not self._driving:
+                self._sit(session, readings)
             self._drive(session, readings)
-        elif not readings.driver and time.monotonic() >= self._claim_at:
-            self._claim_at = time.monotonic() + CLAIM_EVERY
-            self._bus.control(Control("claim", self._bus.ident))
+            return
+        if self._driving:
+            self._driving, self._enlisted = False, False
+            self._log.flush()
+            self._say(f"unseated at tick {readings.tick}: {readings.driver or 'nobody'} drives")
+        elif self._seated and readings.driver and readings.author == readings.driver:
+            self._replaced = self._mode != "stand by"
+        self._seek(readings)
+        self._follow(session, readings)
+
+    def _seek(self, readings: Readings) -> None:
+        """Ask for the seat, as the mode says."""
+        now = time.monotonic()
+        if now < self._claim_at:
+            return
+        if self._mode == "claim" or (self._mode == "take over" and self._seated):
+            if not readings.driver:
+                self._claim_at = now + CLAIM_EVERY
+                self._bus.control(Control("claim", self._bus.ident))
+        elif not self._enlisted:
+            self._claim_at = now + CLAIM_EVERY
+            reply = self._bus.control(Control(self._mode, self._bus.ident, at=self._at))
+            self._enlisted = reply is not None and reply.ok
+
+    def _follow(self, session: Session, readings: Readings) -> None:
+        """Learn from what another driver does; a standby of its kind keeps in step with it."""
+        if self._mode == "claim" or not readings.driver:
+            return
+        self._predecessor = readings.driver
+        if readings.driver != self._leader and readings.author == readings.driver:  # it has nothing to ask us any more
+            self._leader = readings.driver
+            self._related = self._inherit(session, probe=True)
+        if self._mode == "stand by":
+            if self._related and not (self._in_step and readings.tick <= session.agent.tick[1] + 1):
+                self._in_step = self._inherit(session)
+            self._answer(session, readings)
+        elif self._leader and not self._related:
+            self._answer(session, readings)
+
+    def _sit(self, session: Session, readings: Readings) -> None:
+        """Begin to drive, with what the predecessor knows if it is of the same kind."""
+        if self._predecessor and not self._in_step and self._mode != "claim":
+            self._leader = self._predecessor
+            if self._inherit(session):
+                self._say(f"inherited what {self._leader} knew at tick {session.agent.tick[1]}")
+        self._driving = self._seated = self._in_step = True
+        self._say(f"drives from tick {readings.tick} on")
+
+    def _inherit(self, session: Session, probe: bool = False) -> bool:
+        """Become what the leader is; whether it could. `probe`: only find out whether it would fit."""
+        agent = session.agent
+        request = CheckpointRequest(self._leader, agent.name, agent.task.percept, probe)
+        reply: CheckpointReply | None = self._bus.ask_agent(self._leader, "checkpoint", request, INHERIT_WITHIN)
+        if reply is None or reply.reason or probe:
+            if not probe:
+                self._say(f"inherited nothing: {self._leader} {'does not answer' if reply is None else reply.reason}")
+            return reply is not None and not reply.reason
+        try:
+            meta, arrays = decode(reply.data, self._leader)
+            if meta.run != session.world.run:
+                return False
+            agent.restore(meta, arrays, self._leader)
+        except UserError as error:
+            self._say(str(error))
+            return False
+        session.answer = Once(agent, agent.tick, agent.command)
+        self._save(agent)
+        return True
+
+    def _bequeath(self, event: Event) -> None:
+        """Tell a successor what it needs to continue."""
+        request: CheckpointRequest | None = event.message
+        if request is None or request.agent != self._bus.ident or event.reply is None:
+            return
+        session, reply = self._session, CheckpointReply()
+        if session is None:
+            reply.reason = "knows nothing yet"
+        elif (request.learner, request.percept) != (session.agent.name, session.agent.task.percept):
+            reply.reason = f"is {session.agent.name} with the percept {session.agent.task.percept}"
+        elif not request.probe:
+            reply.data = encode(*session.agent.checkpoint())
+        event.reply(reply)
 
     def _drive(self, session: Session, readings: Readings) -> None:
         """Answer one tick: first to the journal, then to the learner, then to the bus."""
         agent = session.agent
         fresh = (readings.run, readings.tick) != agent.tick
-        if fresh and self._journal is not None:
-            self._journal.append(msgspec.msgpack.encode(readings))
-        command = session.answer(readings)
+        command = self._answer(session, readings)
         if command is None:
             return
         if 0 < session.world.epochs <= readings.epoch:
@@ -90,14 +211,22 @@ class Server:
         self._bus.put("command", command)
         if fresh:
             self._record(agent)
-            if time.monotonic() >= self._save_at:
-                self._save(agent)
+
+    def _answer(self, session: Session, readings: Readings) -> Command | None:
+        """The command for one tick, whether it will count or not."""
+        agent = session.agent
+        if self._journal is not None and (readings.run, readings.tick) != agent.tick:
+            self._journal.append(msgspec.msgpack.encode(readings))
+        command = session.answer(readings)
+        if time.monotonic() >= self._save_at:
+            self._save(agent)
+        return command
 
     def _meet(self, run: str) -> Session | None:
         """The agent, ready for a run; None when its world is not to be had now."""
         if self._session is not None and self._session.world.run == run:
             return self._session
-        world = self._bus.ask_one("world", World)
+        world = self._bus.ask_one("world")
         if world is None or world.run != run:
             return None
         self._log.flush()
@@ -108,7 +237,9 @@ class Server:
                 agent.restore(*load(self._resume), source=str(self._resume))
         else:
             agent = self._session.agent
-        self._session = Session(world, agent, Once(agent))
+        self._session = Session(world, agent, Once(agent, agent.tick, agent.command))
+        self._driving = self._seated = self._enlisted = self._related = self._in_step = False
+        self._leader = self._predecessor = ""
         self._replay(self._session)
         self._save_at = time.monotonic() + SAVE_EVERY
         return self._session
@@ -154,3 +285,6 @@ class Server:
             self._table_at = now + TABLE_EVERY
             log.values, log.visits, log.current = agent.table(), list(agent.visits), agent.current()
         return log
+
+    def _say(self, text: str) -> None:
+        print(f"{self._bus.ident}: {text}", file=sys.stderr, flush=True)

@@ -6,8 +6,10 @@ counted, and the loop goes on.
 """
 
 import sys
+import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
@@ -18,7 +20,9 @@ from phototaxis.messages import ControlReply, Decoder, LogRequest, Message, Refu
 from phototaxis.topics import ROLES, TOPICS, Topic, alive_key
 
 REQUESTS: dict[str, type[Message]] = {"log": LogRequest}
-REPLY_LIMIT = 16_384
+
+
+Reach = Callable[[str], AbstractContextManager[zenoh.Session | None]]
 
 
 class Event(NamedTuple):
@@ -41,10 +45,12 @@ class Bus:
     name : prefix of the world's keys.
     role : a key of `ROLES`; says which topics are written and read.
     ident : unique name of this component, shown in its liveliness token.
+    reach : gives a session in which an agent, named by its ident, can be asked; by default `session`.
     """
 
-    def __init__(self, session: zenoh.Session, name: str, role: str, ident: str):
-        self.role, self.ident, self._session, self._name = role, ident, session, name
+    def __init__(self, session: zenoh.Session, name: str, role: str, ident: str, reach: Reach | None = None):
+        self.role, self.ident, self.name, self._session = role, ident, name, session
+        self._reach: Reach = reach or (lambda _: nullcontext(session))
         self.refused: Counter[str] = Counter()
         self._inbox: SimpleQueue[tuple[str, Any]] = SimpleQueue()
         self._decoders: dict[str, Decoder[Any]] = {}
@@ -94,29 +100,49 @@ class Bus:
             print(f"{self.role}: refused a message on {topic}: {why}", file=sys.stderr, flush=True)
         self.refused[reason] += 1
 
-    def ask(self, topic: str, request: Message | None = None, timeout: float = 2.0) -> list[bytes]:
-        """The replies to a query on a topic, in the order in which they came; [] when nobody answered."""
-        replies = self._session.get(
-            TOPICS[topic].key(self._name),
+    def ask(
+        self, topic: str, request: Message | None = None, timeout: float = 2.0, session: zenoh.Session | None = None
+    ) -> Iterator[bytes]:
+        """The replies to a query on a topic as they come; none when nobody answers in time."""
+        replies = (session or self._session).get(
+            TOPICS[topic].key(self.name),
             payload=None if request is None else encode(request),
             timeout=timeout,
+            target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+        return (reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None)
 
-    def ask_one(self, topic: str, kind: type[Any], request: Message | None = None, timeout: float = 2.0) -> Any:
+    def ask_agent(self, ident: str, topic: str, request: Message, timeout: float) -> Any:
+        """The answer of one agent as a message; None when it is not there, or gives none in time."""
+        with self._reach(ident) as session:
+            return None if session is None else self.ask_one(topic, request, timeout, session)
+
+    def ask_one(
+        self, topic: str, request: Message | None = None, timeout: float = 2.0, session: zenoh.Session | None = None
+    ) -> Any:
         """The first valid reply as a message, or None."""
-        limit = TOPICS[topic].limit if request is None else REPLY_LIMIT
-        for payload in self.ask(topic, request, timeout):
+        asked = TOPICS[topic]
+        decoder = Decoder(asked.reply, asked.reply_limit) if asked.reply else Decoder(asked.message, asked.limit)
+        for payload in self.ask(topic, request, timeout, session):
             try:
-                return Decoder(kind, limit)(payload)
+                return decoder(payload)
             except Refused as why:
                 self.refuse(topic, str(why))
         return None
 
     def control(self, request: Message, timeout: float = 2.0) -> ControlReply | None:
         """Ask the simulation for something; None when it did not answer."""
-        return self.ask_one("control", ControlReply, request, timeout)
+        return self.ask_one("control", request, timeout)
+
+    def wait_for(self, role: str, timeout: float) -> bool:
+        """Wait until a component of that role is on the bus, dropping what comes meanwhile; whether one is."""
+        deadline = time.monotonic() + timeout
+        while (left := deadline - time.monotonic()) > 0:
+            event = self.receive(timeout=left)
+            if event is not None and event.topic == "alive" and event.message[0] == role:
+                return True
+        return False
 
     def close(self) -> None:
         """Take back what was declared, the token last."""
@@ -133,11 +159,11 @@ class Bus:
 
     def _subscribe(self, topic: Topic) -> None:
         self._decoders[topic.name] = Decoder(topic.message, topic.limit)
-        key = topic.key(self._name)
+        key = topic.key(self.name)
         self._declared.append(self._session.declare_subscriber(key, self._callback(topic.name)))
 
     def _offer(self, topic: Topic) -> None:
-        key = topic.key(self._name)
+        key = topic.key(self.name)
         if topic.kind in ("stream", "log"):
             steady = topic.kind == "stream"
             self._publishers[topic.name] = self._session.declare_publisher(

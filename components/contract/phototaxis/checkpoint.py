@@ -1,4 +1,4 @@
-"""A learner's whole state on disk: complete, written atomically, safe to load.
+"""A learner's whole state, on disk or on the bus: complete, written atomically, safe to load.
 
 The file is a NumPy .npz without pickles: the learner's arrays, and `meta`, the rest as JSON bytes.
 """
@@ -16,6 +16,7 @@ import numpy as np
 from msgspec import Struct
 
 from phototaxis.errors import UserError
+from phototaxis.messages import End, Motor
 
 FORMAT = 1
 _LIMIT = 1_000_000_000
@@ -45,6 +46,8 @@ class Meta(Struct, forbid_unknown_fields=True, kw_only=True):
     """The last state: percept and learner's context; empty for none."""
     linked: bool
     """Whether the last step was learned from, so that the next one continues it."""
+    answer: tuple[Motor, Motor, End] | None
+    """The motor command and the end of the episode with which that tick was answered."""
     random: dict[str, Any]
     """State of the random generator, its large numbers as text."""
     visits: list[int]
@@ -63,13 +66,44 @@ def learner_hash(arrays: dict[str, np.ndarray]) -> str:
     return digest.hexdigest()
 
 
-def save(path: Path, meta: Meta, arrays: dict[str, np.ndarray]) -> None:
-    """Write a checkpoint; a reader sees the old file or the new one, never a part."""
+def encode(meta: Meta, arrays: dict[str, np.ndarray]) -> bytes:
+    """A checkpoint as the bytes of a file."""
     buffer = io.BytesIO()
     named: dict[str, Any] = {"meta": np.frombuffer(msgspec.json.encode(meta), np.uint8), **arrays}
     np.savez(buffer, **named)
+    return buffer.getvalue()
+
+
+def decode(data: bytes, source: str) -> tuple[Meta, dict[str, np.ndarray]]:
+    """A checkpoint from the bytes of a file; `source` names it.
+
+    Raises
+    ------
+    UserError
+        when they are truncated, too large, or not a checkpoint of this format.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > _LIMIT:
+                raise UserError(f"{source}: unpacks to more than {_LIMIT} bytes, not loaded")
+        with np.load(io.BytesIO(data), allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        meta = msgspec.json.decode(arrays.pop("meta").tobytes(), type=Meta)
+    except (zipfile.BadZipFile, EOFError, zlib.error) as error:
+        raise UserError(f"{source}: not a checkpoint, or truncated: {error}") from None
+    except (KeyError, ValueError, OSError, msgspec.MsgspecError) as error:
+        raise UserError(f"{source}: not a Phototaxis checkpoint: {error}") from None
+    if meta.format != FORMAT:
+        raise UserError(f"{source}: checkpoint format {meta.format}, this version reads {FORMAT}")
+    if learner_hash(arrays) != meta.learner_hash:
+        raise UserError(f"{source}: the contents do not match their hash; the file is damaged")
+    return meta, arrays
+
+
+def save(path: Path, meta: Meta, arrays: dict[str, np.ndarray]) -> None:
+    """Write a checkpoint; a reader sees the old file or the new one, never a part."""
     fresh = path.with_suffix(path.suffix + ".new")
-    fresh.write_bytes(buffer.getbuffer())
+    fresh.write_bytes(encode(meta, arrays))
     os.replace(fresh, path)
 
 
@@ -79,23 +113,12 @@ def load(path: Path) -> tuple[Meta, dict[str, np.ndarray]]:
     Raises
     ------
     UserError
-        when the file is missing, truncated, too large, or not a checkpoint of this format.
+        when the file is missing, or as in `decode`.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            if sum(entry.file_size for entry in archive.infolist()) > _LIMIT:
-                raise UserError(f"{path}: unpacks to more than {_LIMIT} bytes, not loaded")
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        meta = msgspec.json.decode(arrays.pop("meta").tobytes(), type=Meta)
+        data = path.read_bytes()
     except FileNotFoundError:
         raise UserError(f"{path}: no such checkpoint") from None
-    except (zipfile.BadZipFile, EOFError, zlib.error) as error:
-        raise UserError(f"{path}: not a checkpoint, or truncated: {error}") from None
-    except (KeyError, ValueError, OSError, msgspec.MsgspecError) as error:
-        raise UserError(f"{path}: not a Phototaxis checkpoint: {error}") from None
-    if meta.format != FORMAT:
-        raise UserError(f"{path}: checkpoint format {meta.format}, this version reads {FORMAT}")
-    if learner_hash(arrays) != meta.learner_hash:
-        raise UserError(f"{path}: the contents do not match their hash; the file is damaged")
-    return meta, arrays
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from None
+    return decode(data, str(path))

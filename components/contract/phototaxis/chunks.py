@@ -51,9 +51,11 @@ class Chunks:
 
     def answer(self, request: Event) -> None:
         """Answer a recorder's request with every kept chunk from its `seq` on, the newest rows included."""
+        wanted = request.message if isinstance(request.message, LogRequest) else LogRequest()
+        if wanted.writer not in ("", self._bus.ident):
+            return
         self.flush()
-        first = request.message.seq if isinstance(request.message, LogRequest) else 0
         if request.reply is not None:
             for seq, payload in self._kept:
-                if seq >= first:
+                if seq >= wanted.seq:
                     request.reply(payload)

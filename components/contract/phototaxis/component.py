@@ -5,45 +5,79 @@ import secrets
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import ExitStack
+from functools import partial
 from typing import Annotated
 
+import msgspec
 from msgspec import Meta
 
 from phototaxis.bus import Bus
 from phototaxis.errors import one_line
-from phototaxis.session import BusOptions, open_session
+from phototaxis.session import BusOptions, open_session, reaching
 
 
 class ComponentOptions(BusOptions, kw_only=True):
     """Options that every component has."""
 
-    id: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
-    """a word of your choice in this component's name on the bus, by which `phototaxis health` finds it"""
     tethered: bool = False
     """end when standard input closes, so that no process outlives the one that started it"""
+    id: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    """a word in its made-up name on the bus, by which `phototaxis health` finds it"""
+    ident: Annotated[str, Meta(max_length=24, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    """its whole name on the bus, which nobody else may have or have had (default: made up)"""
     restarted: bool = False
     """this process replaces one that died: continue from what that one left on disk, if anything"""
 
 
-def run(role: str, options: ComponentOptions, serve: Callable[[Bus], None], label: str = "") -> None:
+def run(
+    role: str, options: ComponentOptions, serve: Callable[[Bus], None], label: str = "", worlds: Sequence[str] = ()
+) -> None:
     """Open the bus as `role`, call `serve(bus)` and close everything, whatever happens.
 
-    SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it.
+    SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it. With several `worlds` in
+    place of `options.name`, each is served in a thread of its own; the first error ends all of them.
     """
-    ident = "-".join(filter(None, (label or role, options.id, secrets.token_hex(2))))
-    with open_session(role, options) as session, Bus(session, options.name, role, ident) as bus:
+    ident = options.ident or made_up(label or role, options.id)
+    with ExitStack() as stack:
+        buses: list[Bus] = []
+        for name in worlds or [options.name]:
+            own = msgspec.structs.replace(options, name=name)
+            session = stack.enter_context(open_session(role, own, ident))
+            buses.append(stack.enter_context(Bus(session, name, role, ident, partial(reaching, session, own))))
+        stop = partial(_stop, buses)
         for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, lambda *_: bus.stop())
+            signal.signal(number, stop)
         if options.tethered:
-            threading.Thread(target=_hold_tether, args=(bus,), daemon=True).start()
-        serve(bus)
+            threading.Thread(target=_hold_tether, args=(stop,), daemon=True).start()
+        if len(buses) == 1:
+            serve(buses[0])
+            return
+        with ThreadPoolExecutor(len(buses)) as pool:
+            served = [pool.submit(serve, bus) for bus in buses]
+            for one in as_completed(served):
+                if one.exception():
+                    stop()
+        for one in served:
+            one.result()
 
 
-def _hold_tether(bus: Bus) -> None:
+def _stop(buses: Sequence[Bus], *_: object) -> None:
+    for bus in buses:
+        bus.stop()
+
+
+def made_up(label: str, word: str = "") -> str:
+    """A name on the bus that is not taken."""
+    return "-".join(filter(None, (label[:19], word, secrets.token_hex(2))))
+
+
+def _hold_tether(stop: Callable[[], None]) -> None:
     while os.read(sys.stdin.fileno(), 4096):
         pass
-    bus.stop()
+    stop()
 
 
 def entry(body: Callable[[], None]) -> None:

@@ -123,6 +123,17 @@ class Episode(Message):
     heading: float
 
 
+How = Literal["claimed", "took over", "stood by"]
+
+
+class Seating(Struct, forbid_unknown_fields=True):
+    """Who drives from a tick on, and how it came to the seat."""
+
+    driver: Name
+    tick: Count
+    how: How
+
+
 Phase = Literal["waiting", "running", "paused", "finished"]
 
 
@@ -152,6 +163,10 @@ class Status(Message):
     mean_rate: float = 0.0
     """Ticks a second since the first answer (of this simulation process)."""
     driver: Name = ""
+    drivers: list[Seating] = field(default_factory=list)
+    """Who held the seat since when, the newest last (of this simulation process; at most 50)."""
+    next: list[Name] = field(default_factory=list)
+    """Who will or would drive next: takers-over by their tick, then standbys."""
     alive: list[str] = field(default_factory=list)
     """"role/id" of every component whose token is on the bus."""
     refused: dict[str, int] = field(default_factory=dict)
@@ -162,9 +177,15 @@ class Status(Message):
 class Control(Message):
     """A request to the simulation."""
 
-    verb: Literal["status", "pause", "resume", "step", "speed", "reset", "claim", "release", "stop"]
+    verb: Literal[
+        "status", "pause", "resume", "step", "speed", "reset", "stop", "claim", "take over", "stand by", "release"
+    ]
+    """claim: sit down on a free seat. take over: at the first tick boundary from tick `at` on. stand by: when nobody
+    else drives any more. release: leave the seat, or the queue for it."""
     agent: Name = ""
-    """claim, release: whose seat."""
+    """Of the last four verbs: whose seat."""
+    at: Count = 0
+    """take over: from which tick on."""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """speed: 0 is lockstep."""
 
@@ -175,6 +196,45 @@ class ControlReply(Message):
     ok: bool
     reason: str
     status: Status
+
+
+class CheckpointRequest(Message):
+    """A successor asks an agent for everything it needs to continue bit for bit."""
+
+    agent: Name
+    """Who is asked; the others keep silent."""
+    learner: str
+    """Of the successor; another learner or percept is refused without sending anything."""
+    percept: str
+    probe: bool = False
+    """Only say whether it fits."""
+
+
+class CheckpointReply(Message):
+    """What an agent says to its successor."""
+
+    reason: str = ""
+    """Why it does not fit; then there are no data."""
+    data: bytes = b""
+    """A checkpoint file: a NumPy .npz without pickles."""
+
+
+class Launch(Message):
+    """A request to the launcher: start an agent that takes the seat over."""
+
+    words: Annotated[list[Annotated[str, Meta(max_length=1000)]], Meta(max_length=100)]
+    """Options of `phototaxis agent`: the learner and its hyperparameters."""
+
+
+class LaunchReply(Message):
+    """What the launcher says."""
+
+    reason: str = ""
+    """Why nothing came of it; "" when the new agent drives."""
+    agent: Name = ""
+    """Name of the new agent."""
+    tick: Count = 0
+    """It drives from this tick on."""
 
 
 Column = list[float]
@@ -240,6 +300,8 @@ class LogRequest(Message):
     """Asks a component for the log chunks it still has, from `seq` on."""
 
     seq: Count = 0
+    writer: Name = ""
+    """Who is asked; "" for everyone."""
 
 
 class Refused(Exception):

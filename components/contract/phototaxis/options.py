@@ -138,7 +138,7 @@ def parse_groups(
 def peek(argv: Sequence[str], flag: str, default: str) -> str:
     """The value of one option before the rest is known (which options there are may depend on it)."""
     value = default
-    for here, following in zip(argv, [*argv[1:], ""], strict=True):
+    for here, following in pairwise([*argv, ""]):
         if here == flag:
             value = following
         elif here.startswith(flag + "="):

@@ -15,13 +15,16 @@ Answer = TypeVar("Answer")
 class Once(Generic[Answer]):
     """Answers a tick once; the same question again gets the remembered answer, an older one None.
 
-    `answer` is called with a message that has `run` and `tick`.
+    `answer` is called with a message that has `run` and `tick`. Who continues for another one is given the
+    run and tick that were answered last, and the answer.
     """
 
-    def __init__(self, answer: Callable[[Any], Answer]):
+    def __init__(
+        self, answer: Callable[[Any], Answer], after: tuple[str, int] = ("", -1), remembered: Answer | None = None
+    ):
         self._answer = answer
-        self._run, self._tick = "", -1
-        self._remembered: Answer | None = None
+        self._run, self._tick = after
+        self._remembered: Answer | None = remembered
 
     def __call__(self, question: Any) -> Answer | None:
         if question.run == self._run and question.tick <= self._tick:

@@ -1,19 +1,67 @@
-"""`phototaxis router`: where components on several machines or in containers meet, in place of a zenohd."""
+"""Zenoh configurations for a guarded bus: one router, everyone else its client."""
 
-import signal
-import threading
+import json
 from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any, Literal
 
-from phototaxis.options import parse
-from phototaxis.session import BusOptions, open_session
+from phototaxis import rights
+
+Auth = Literal["mtls", "password"]
+"""Who is who: by certificate, or by user name and password; encrypted by TLS either way."""
+
+QUIET = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
 
 
-def main(argv: Sequence[str] | None = None) -> None:
-    options = parse(BusOptions, argv, "phototaxis router", "Route the bus for components elsewhere (a Zenoh router).")
-    if not options.listen and not options.zenoh_config:
-        options.listen = ["tcp/127.0.0.1:7447"]
-    end = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: end.set())
-    with open_session("router", options):
-        end.wait()
+def router_config(worlds: Sequence[str], listen: Sequence[str], folder: PurePath, auth: Auth) -> dict[str, Any]:
+    """Of the router.
+
+    Parameters
+    ----------
+    worlds : names of the worlds that may be on its bus.
+    listen : its endpoints, as in tls/0.0.0.0:7447.
+    folder : where `phototaxis certs` put ca.pem, router.pem, router.key and users.txt.
+    auth : how components say who they are.
+    """
+    tls = {
+        "root_ca_certificate": str(folder / "ca.pem"),
+        "listen_certificate": str(folder / "router.pem"),
+        "listen_private_key": str(folder / "router.key"),
+        "enable_mtls": auth == "mtls",
+    }
+    transport: dict[str, Any] = {"link": {"tls": tls}}
+    if auth == "password":
+        transport["auth"] = {"usrpwd": {"dictionary_file": str(folder / "users.txt")}}
+    return {
+        "mode": "router",
+        "listen": {"endpoints": list(listen)},
+        "scouting": QUIET,
+        "transport": transport,
+        "access_control": rights.access_control(worlds),
+        "low_pass_filter": rights.low_pass_filter(worlds),
+    }
+
+
+def client_config(connect: str, folder: PurePath, name: str, auth: Auth, password: str = "") -> dict[str, Any]:
+    """Of one component, whose name at the router is `name`."""
+    tls = {"root_ca_certificate": str(folder / "ca.pem"), "verify_name_on_connect": True}
+    transport: dict[str, Any] = {"link": {"tls": tls, "tx": {"lease": 1000}}, "unicast": {"qos": {"enabled": False}}}
+    if auth == "mtls":
+        tls |= {
+            "connect_certificate": str(folder / f"{name}.pem"),
+            "connect_private_key": str(folder / f"{name}.key"),
+            "enable_mtls": True,
+        }
+    else:
+        transport["auth"] = {"usrpwd": {"user": name, "password": password}}
+    return {
+        "mode": "client",
+        "connect": {"endpoints": [connect], "timeout_ms": 5000, "exit_on_failure": True},
+        "scouting": QUIET,
+        "transport": transport,
+    }
+
+
+def text(config: dict[str, Any], made_by: str) -> str:
+    """A configuration as a JSON5 file that says where it comes from."""
+    return f"// Made by: {made_by}\n{json.dumps(config, indent=1)}\n"

@@ -7,7 +7,7 @@ from phototaxis import messages as m
 Kind = Literal["stream", "retained", "log", "query"]
 """stream: the lockstep path, delivered or repeated. retained: answered by a queryable at any time.
 log: columns to be recorded, dropped under pressure, kept a while and answered by a queryable.
-query: a question to the writer."""
+query: a question to the writer, whose message is the question."""
 
 
 class Topic(NamedTuple):
@@ -18,8 +18,12 @@ class Topic(NamedTuple):
     writer: str
     kind: Kind
     limit: int
-    """Largest payload that is decoded, bytes."""
+    """Largest payload that is accepted, bytes; of a query: of the question."""
     about: str
+    reply: type[m.Message] | None = None
+    """What a query is answered with."""
+    reply_limit: int = 0
+    """Largest answer that is accepted, bytes."""
 
     def key(self, prefix: str) -> str:
         """The Zenoh key under the prefix of one world."""
@@ -34,8 +38,37 @@ TOPICS = {
         Topic("readings", m.Readings, "sensors", "stream", 4_096, "sonars, lights, bumpers, echoed command"),
         Topic("command", m.Command, "agent", "stream", 4_096, "the answer: two motors, or the episode's end"),
         Topic("episode", m.Episode, "sim", "stream", 4_096, "one episode, when it has ended"),
-        Topic("status", m.Status, "sim", "stream", 16_384, "how the run is doing, 5 times a second"),
-        Topic("control", m.Control, "sim", "query", 4_096, "pause, resume, step, speed, reset, seat, stop"),
+        Topic("status", m.Status, "sim", "stream", 32_768, "how the run is doing, 5 times a second"),
+        Topic(
+            "control",
+            m.Control,
+            "sim",
+            "query",
+            4_096,
+            "pause, resume, step, speed, reset, seat, stop",
+            m.ControlReply,
+            32_768,
+        ),
+        Topic(
+            "checkpoint",
+            m.CheckpointRequest,
+            "agent",
+            "query",
+            4_096,
+            "what a successor needs to continue",
+            m.CheckpointReply,
+            256_000_000,
+        ),
+        Topic(
+            "launch",
+            m.Launch,
+            "launcher",
+            "query",
+            16_384,
+            "start an agent that takes the seat over",
+            m.LaunchReply,
+            4_096,
+        ),
         Topic("log/sim", m.SimLog, "sim", "log", 1_000_000, "poses, commands, ended episodes, in columns"),
         Topic("log/sensors", m.SensorsLog, "sensors", "log", 1_000_000, "readings, in columns"),
         Topic("log/agent", m.AgentLog, "agent", "log", 4_000_000, "percepts, actions, learning, in columns"),
@@ -49,16 +82,19 @@ class Role(NamedTuple):
     reads: tuple[str, ...]
     dials: tuple[str, ...]
     listens: bool = True
+    asks: tuple[str, ...] = ()
+    """Queries that it sends (of what it reads it may ask, too)."""
 
 
 ROLES = {
     "sim": Role(reads=("command",), dials=()),
-    "sensors": Role(reads=("state",), dials=("sim",)),
-    "recorder": Role(reads=("log/sim", "log/sensors", "log/agent"), dials=("sim", "sensors")),
-    "agent": Role(reads=("readings",), dials=("sim", "sensors", "recorder"), listens=False),
-    "observer": Role(reads=("status",), dials=("sim",), listens=False),
+    "sensors": Role(reads=("state",), dials=("sim",), asks=("world",)),
+    "recorder": Role(reads=("log/sim", "log/sensors", "log/agent"), dials=("sim", "sensors"), asks=("world",)),
+    "agent": Role(reads=("readings",), dials=("sim", "sensors", "recorder"), asks=("world", "control", "checkpoint")),
+    "launcher": Role(reads=("status",), dials=("sim",), asks=("control",)),
+    "observer": Role(reads=("status",), dials=("sim", "launcher"), listens=False, asks=("world", "control", "launch")),
 }
-"""sim listens, sensors and recorder dial it and listen, agents and observers only dial: they come and go freely."""
+"""sim listens, the others dial it. Agents come and go freely: they dial, and listen only for their successors."""
 
 
 def alive_key(prefix: str, role: str, ident: str) -> str:

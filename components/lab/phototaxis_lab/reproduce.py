@@ -1,6 +1,7 @@
 """`phototaxis reproduce`: the paper's experiments, as a page of claims, measurements and figures."""
 
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,7 +17,7 @@ class Options(Running, kw_only=True):
     seeds: SEEDS = "0:20"
     """A:B: the seeds from A to B − 1"""
     results: str = "runs/reproduction"
-    """folder of the results; an interrupted reproduction continues there"""
+    """folder of the results, paper/ and beyond/; an interrupted reproduction continues there"""
     out: str = "docs/reproduction"
     """folder that the page and its figures are written to"""
 
@@ -32,7 +33,12 @@ def main(argv: Sequence[str]) -> int:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"--out {out}: {error.strerror}") from None
-    found = by_system(compute(plan.cells(seeds), Path(options.results), options))
+    found = {}
+    for part, planned in plan.PARTS.items():
+        began, cells = time.monotonic(), plan.cells(planned, seeds)
+        print(f"{part}: {len(cells)} agents learn and are measured", file=sys.stderr)
+        found |= by_system(compute(cells, Path(options.results) / part, options))
+        print(f"{part}: {(time.monotonic() - began) / 60:.1f} minutes", file=sys.stderr)
     data = {
         name: {epochs: found[system, epochs] for epochs in budgets} for name, (system, budgets) in plan.WHOLE.items()
     }

@@ -1,7 +1,6 @@
 """`phototaxis status` and `phototaxis control`: talk to a running simulation from another terminal."""
 
 import sys
-import time
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
@@ -41,15 +40,12 @@ def request(options: BusOptions, control: Control) -> ControlReply:
         when there is none, or it does not answer.
     """
     with open_session("observer", options) as session, Bus(session, options.name, "observer", "ask") as bus:
-        deadline = time.monotonic() + PATIENCE
-        while (left := deadline - time.monotonic()) > 0:
-            event = bus.receive(timeout=left)
-            if event is not None and event.topic == "alive" and event.message[0] == "sim":
-                reply = bus.control(control, timeout=PATIENCE)
-                if reply is not None:
-                    return reply
-                raise Unavailable(f"the simulation of '{options.name}' does not answer; is it stopped or overloaded?")
-    raise Unavailable(f"no simulation in the world '{options.name}'; start one with: phototaxis up")
+        if not bus.wait_for("sim", PATIENCE):
+            raise Unavailable(f"no simulation in the world '{options.name}'; start one with: phototaxis up")
+        reply = bus.control(control, timeout=PATIENCE)
+    if reply is None:
+        raise Unavailable(f"the simulation of '{options.name}' does not answer; is it stopped or overloaded?")
+    return reply
 
 
 def status(argv: Sequence[str]) -> int:

@@ -26,13 +26,18 @@ VERBS = {
         "phototaxis_launcher.ask:status", "launcher", "who is alive, which tick, who drives, what is awaited"
     ),
     "control": Verb("phototaxis_launcher.ask:control", "launcher", "pause, resume, step, speed, reset, stop"),
+    "swap": Verb("phototaxis_launcher.swap:main", "launcher", "hand the seat to another learner while the robot runs"),
+    "router": Verb("phototaxis_launcher.router:main", "launcher", "a Zenoh router, for components on several machines"),
+    "certs": Verb("phototaxis_launcher.certs:main", "certs", "certificates and passwords for a guarded router"),
+    "check": Verb(
+        "phototaxis_lab.check:main", "lab", "an agent against the contract; rights and wire format against the code"
+    ),
     "sim": Verb("phototaxis_sim.__main__:main", "sim", "the simulation alone"),
     "sensors": Verb("phototaxis_sensors.__main__:main", "sensors", "the sensors alone"),
     "agent": Verb("phototaxis_agent.__main__:main", "agent", "an agent alone"),
     "recorder": Verb("phototaxis_recorder.__main__:main", "recorder", "the recorder alone"),
     "view": Verb("phototaxis_launcher.view:main", "recorder", "the live view or a recording, in a window or browser"),
     "recordings": Verb("phototaxis_launcher.recordings:main", "launcher", "list recordings; remove old ones"),
-    "router": Verb("phototaxis.router:main", "launcher", "a Zenoh router, for components on several machines"),
     "health": Verb("phototaxis_launcher.health:main", "launcher", "is this component on the bus? for health checks"),
     "train": Verb("phototaxis_lab.train:main", "lab", "the same learning in one process, without a bus"),
     "experiment": Verb("phototaxis_lab.experiment:main", "lab", "a grid of agents and seeds, in parallel, resumable"),

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from pathlib import Path
 
+from phototaxis.component import made_up
 from phototaxis.errors import ComponentFailed, Unavailable, UserError
 
 RESTARTS = 3
@@ -20,18 +21,34 @@ class Child:
 
     It is tethered: when this process ends, however it ends, the child's standard input closes and the
     child leaves.
+
+    Parameters
+    ----------
+    name : names its log file, and it in messages.
+    module : Python module that is its program.
+    label : if given, each start gets a name on the bus that begins with it.
+
+    Attributes
+    ----------
+    idents : the names on the bus that it had, the newest last.
+    left : it ended by itself, without an error.
     """
 
-    def __init__(self, role: str, module: str, arguments: list[str], folder: Path):
-        self.role = role
+    def __init__(self, name: str, module: str, arguments: list[str], folder: Path, label: str = ""):
+        self.name, self.label = name, label
         self._module, self._arguments = module, arguments
-        self._log = folder / f"{role}.log"
+        self._log = folder / f"{name}.log"
+        self.idents: list[str] = []
+        self.left = False
         self._deaths: deque[float] = deque(maxlen=RESTARTS + 1)
         self.restarts = 0
         self.process: subprocess.Popen[bytes] | None = None
 
     def start(self, *extra: str) -> None:
         """Start the process in a session of its own, so that Ctrl-C reaches the launcher alone."""
+        if self.label:
+            self.idents.append(made_up(self.label))
+            extra = *extra, f"--ident={self.idents[-1]}"
         with self._log.open("ab") as log:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", self._module, "--tethered", *self._arguments, *extra],
@@ -42,7 +59,7 @@ class Child:
             )
 
     def watch(self) -> bool:
-        """Restart the process if it has died; whether it had to.
+        """Restart the process if it has died; whether it had to. One that ended without an error has `left`.
 
         Raises
         ------
@@ -54,13 +71,16 @@ class Child:
         if self.process is None or self.process.poll() is None:
             return False
         code = self.process.returncode
+        if code == 0:
+            self.left = True
+            return False
         if code in MENDABLE:
             line = self.tail(1).removeprefix("phototaxis: error: ")
-            raise MENDABLE[code](f"{self.role}: {line}")
+            raise MENDABLE[code](f"{self.name}: {line}")
         self._deaths.append(time.monotonic())
         if len(self._deaths) > RESTARTS and self._deaths[-1] - self._deaths[0] < WITHIN:
             raise ComponentFailed(
-                f"{self.role} died {len(self._deaths)} times, last with {_meaning(code)}; "
+                f"{self.name} died {len(self._deaths)} times, last with {_meaning(code)}; "
                 f"its last words:\n{self.tail(20)}"
             )
         self.restarts += 1
@@ -77,7 +97,7 @@ class Child:
                 self.process.wait(patience)
             except subprocess.TimeoutExpired:
                 print(
-                    f"phototaxis: {self.role} did not end within {patience:g} s and was killed",
+                    f"phototaxis: {self.name} did not end within {patience:g} s and was killed",
                     file=sys.stderr,
                 )
                 self.process.kill()

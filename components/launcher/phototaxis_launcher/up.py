@@ -1,6 +1,7 @@
 """`phototaxis up`: the processes of a run, brought up, watched and ended together."""
 
 import json
+import re
 import signal
 import socket
 import sys
@@ -10,11 +11,11 @@ from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
-from phototaxis.bus import Bus
+from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
 from phototaxis.errors import ComponentFailed, UserError
-from phototaxis.messages import Status, run_name
-from phototaxis.options import Parser, add_options, convert, flags
+from phototaxis.messages import Launch, LaunchReply, Status, run_name
+from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
 
@@ -24,6 +25,7 @@ from phototaxis_launcher.progress import Progress
 PORT = Annotated[int, Meta(ge=-1, le=65535)]
 PATIENCE = {"recorder": 60.0, "agent": 15.0, "sensors": 5.0, "sim": 5.0}
 """Seconds that a component gets to end; also the order in which they are ended."""
+SWAPS = re.compile(r"(?P<tick>[0-9]+):(?P<learner>[^:,\s]+)")
 STARTING = 60.0
 """Seconds within which all components must be on the bus."""
 
@@ -39,6 +41,9 @@ class UpOptions(BusOptions, kw_only=True):
     """learning steps; 0: run until stopped"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """simulated seconds per second; 0: lockstep, as fast as it goes"""
+    swap: str = ""
+    """TICK:LEARNER,…: at these ticks fresh agents take over; they inherit from one of their kind, and learn in the
+    shadow of another"""
     out: str = "runs"
     """folder for the run's own folder: recording, checkpoint, logs"""
     no_recorder: bool = False
@@ -55,27 +60,33 @@ class Run:
     """One run of the system."""
 
     def __init__(self, options: UpOptions, agent_words: list[str]):
-        self._options = options
+        self._options, self._words = options, agent_words
+        swaps = swap_plan(options.swap)
         self.name = run_name()
         self.folder = Path(options.out).resolve() / self.name
         try:
             self.folder.mkdir(parents=True)
         except OSError as error:
             raise UserError(f"--out {options.out}: {error.strerror}") from None
-        self.checkpoint = self.folder / "checkpoint.npz"
+        self.checkpoint = self._checkpoint("agent")
+        """That of the agent that drove last."""
         self.recording = self.folder / "recording.rrd"
         self.url = ""
         self._alive: list[str] = []
-        bus = _bus_flags(options)
+        bus = self._bus = _bus_flags(options)
         common = [f"--run={self.name}", f"--arena={options.arena}", f"--seed={options.seed}"]
+        self.agents: list[Child] = []
+        self._pending: list[tuple[Child, Event]] = []
         self.children = {
             "sim": self._child(
                 "sim", *bus, *common, f"--epochs={options.epochs}", f"--speed={options.speed}",
                 f"--journal={self.folder / 'sim.journal'}",
             ),
             "sensors": self._child("sensors", *bus),
-            "agent": self._child("agent", *bus, f"--checkpoint={self.checkpoint}", *agent_words),
+            "agent": self._agent(agent_words),
         }  # fmt: skip
+        for tick, learner in swaps:
+            self._agent(self._successor(["--learner", learner]), "--take-over", f"--at={tick}")
         if not options.no_recorder:
             grpc, web = _port(options.grpc_port), _port(options.web_port)
             self.children["recorder"] = self._child(
@@ -87,16 +98,33 @@ class Run:
     def _child(self, role: str, *arguments: str) -> Child:
         return Child(role, f"phototaxis_{role}", list(arguments), self.folder)
 
+    def _agent(self, words: list[str], *more: str) -> Child:
+        """One more agent, with a checkpoint of its own."""
+        name = f"agent-{len(self.agents) + 1}" if self.agents else "agent"
+        arguments = [*self._bus, f"--checkpoint={self._checkpoint(name)}", *words, *more]
+        child = Child(name, "phototaxis_agent", arguments, self.folder, label=_learner(words))
+        self.agents.append(child)
+        return child
+
+    def _checkpoint(self, name: str) -> Path:
+        return self.folder / f"{name.replace('agent', 'checkpoint')}.npz"
+
+    def _successor(self, words: list[str]) -> list[str]:
+        """Words for a new agent: what the first one was given comes first, as far as it is not another learner's."""
+        if _learner(words) == _learner(self._words):
+            return [*self._words, *words]
+        percept = peek(self._words, "--percept", "")
+        return [*([f"--percept={percept}"] if percept else []), *words]
+
     def go(self, progress: Progress) -> Status:
         """Start, watch until finished or stopped, end; the last status.
 
         The agent is started when everyone else is on the bus, so that the recording has every tick.
         """
         status = Status(self.name, "waiting")
-        observer = f"up-{self.name}"
         with (
-            open_session("observer", self._options) as session,
-            Bus(session, self._options.name, "observer", observer) as bus,
+            open_session("launcher", self._options) as session,
+            Bus(session, self._options.name, "launcher", f"up-{self.name}") as bus,
         ):
             for number in (signal.SIGTERM, signal.SIGINT):
                 signal.signal(number, lambda *_: bus.stop())
@@ -104,16 +132,21 @@ class Run:
                 for role, child in self.children.items():
                     if role != "agent":
                         child.start()
+                for agent in self.agents[1:]:
+                    agent.start()
                 deadline = time.monotonic() + STARTING
-                while not self._complete(status):
+                while not self._complete(status) and not self.children["sim"].left:
                     event = bus.receive(timeout=0.1)
                     self._watch(progress)
                     if event is not None and event.topic == "stop":
                         break
+                    if event is not None and event.topic == "launch":
+                        self._launch(event, progress)
                     if event is not None and event.topic == "status" and event.message.run == self.name:
                         status = event.message
                         progress.show(status)
                         self._report(status, progress)
+                        self._confirm(status)
                     if self.children["agent"].process is None:
                         self._start_agent(status, deadline, progress)
             finally:
@@ -126,9 +159,46 @@ class Run:
         return status.phase == "finished" and self.children.keys() <= {who.split("/")[0] for who in status.alive}
 
     def _watch(self, progress: Progress) -> None:
-        for child in self.children.values():
-            if child.watch():
-                progress.say(f"{child.role} died and was restarted; see {self.folder}")
+        for child in self._all():
+            try:
+                if child.watch():
+                    progress.say(f"{child.name} died and was restarted; see {self.folder}")
+            except UserError as error:
+                if not self._answer(child, LaunchReply(str(error))):
+                    raise
+                progress.say(str(error))
+                self.agents.remove(child)
+
+    def _all(self) -> list[Child]:
+        return [*(child for child in self.children.values() if child not in self.agents), *self.agents]
+
+    def _launch(self, event: Event, progress: Progress) -> None:
+        """Start an agent that takes over; the answer is given when it drives, or cannot."""
+        request: Launch | None = event.message
+        if request is None or event.reply is None:
+            return
+        child = self._agent(self._successor(request.words), "--take-over")
+        child.start()
+        self._pending.append((child, event))
+        progress.say(f"asked to swap: {child.name} is started")
+
+    def _confirm(self, status: Status) -> None:
+        """Note whose checkpoint counts; tell those who asked for a swap that it has happened."""
+        driving = [agent for agent in self.agents if status.driver and status.driver in agent.idents]
+        self.checkpoint = self._checkpoint(driving[0].name) if driving else self.checkpoint
+        for child, _ in list(self._pending):
+            for seating in status.drivers:
+                if seating.driver in child.idents:
+                    self._answer(child, LaunchReply(agent=seating.driver, tick=seating.tick))
+
+    def _answer(self, child: Child, reply: LaunchReply) -> bool:
+        """Answer who asked for this agent; whether somebody had."""
+        asked = [event for one, event in self._pending if one is child]
+        for event in asked:
+            if event.reply is not None:
+                event.reply(reply)
+        self._pending = [(one, event) for one, event in self._pending if one is not child]
+        return bool(asked)
 
     def _report(self, status: Status, progress: Progress) -> None:
         """Say who is alive, when that changes."""
@@ -140,29 +210,41 @@ class Run:
     def _start_agent(self, status: Status, deadline: float, progress: Progress) -> None:
         present = {who.split("/")[0] for who in status.alive}
         missing = self.children.keys() - present - {"agent"}
-        if not missing:
+        waiting = [agent.name for agent in self.agents[1:] if not {*agent.idents} & {*status.next}]
+        if not missing and not waiting:
             self.children["agent"].start()
             if self.url:
                 progress.say(f"watch at {self.url}")
         elif time.monotonic() > deadline:
-            who = ", ".join(sorted(missing))
+            who = ", ".join(sorted(missing) or waiting)
             raise ComponentFailed(f"{who} did not come up within {STARTING:g} s; see {self.folder}")
 
     def stop(self) -> None:
         """End every child; the recorder first, while those it still asks are alive."""
         for role, patience in PATIENCE.items():
-            if role in self.children:
-                self.children[role].stop(patience)
+            for child in self.agents if role == "agent" else [self.children[role]] if role in self.children else []:
+                child.stop(patience)
 
     def result(self, status: Status) -> dict[str, object]:
-        """What the run came to."""
+        """What the run came to; the learner is the one that drove last."""
         meta = load(self.checkpoint)[0] if self.checkpoint.exists() else None
+        names = {ident: agent for agent in self.agents for ident in agent.idents}
         recordings = sorted(self.folder.glob("recording*.rrd"), key=lambda path: path.stat().st_mtime)
         return {
             "run": self.name,
             "arena": self._options.arena,
             "seed": self._options.seed,
             "learner": meta.learner if meta else None,
+            "drivers": [
+                {
+                    "driver": one.driver,
+                    "learner": names[one.driver].label if one.driver in names else None,
+                    "checkpoint": str(self._checkpoint(names[one.driver].name)) if one.driver in names else None,
+                    "from_tick": one.tick,
+                    "how": one.how,
+                }
+                for one in status.drivers
+            ],
             "finished": status.phase == "finished",
             "epochs": status.epoch,
             "episodes": status.episodes,
@@ -174,9 +256,22 @@ class Run:
             "learner_hash": meta.learner_hash if meta else None,
             "recording": str(recordings[-1]) if recordings else None,
             "checkpoint": str(self.checkpoint) if meta else None,
-            "restarts": {role: child.restarts for role, child in self.children.items() if child.restarts},
+            "restarts": {child.name: child.restarts for child in self._all() if child.restarts},
             "refused": status.refused,
         }
+
+
+def swap_plan(text: str) -> list[tuple[int, str]]:
+    """The ticks and learners of TICK:LEARNER,…; UserError when it is something else."""
+    found = [SWAPS.fullmatch(part) for part in text.split(",")] if text else []
+    plan = [(int(one["tick"]), one["learner"]) for one in found if one]
+    if len(plan) < len(found) or sorted({tick for tick, _ in plan}) != [tick for tick, _ in plan]:
+        raise UserError(f"--swap {text}: expected TICK:LEARNER with growing ticks, as in 1000:qtable,2000:dqn")
+    return plan
+
+
+def _learner(words: Sequence[str]) -> str:
+    return peek(words, "--learner", "qtable")
 
 
 def parse(argv: Sequence[str], prog: str = "phototaxis up") -> tuple[UpOptions, list[str]]:

@@ -36,7 +36,10 @@ class Server:
         self._bus, self._start, self._finish, self._tell = bus, start, finish, tell
         self._run = ""
         self._translator: Translator | None = None
-        self._expected: dict[str, tuple[str, int]] = {}
+        self._expected: dict[tuple[str, str], int] = {}
+        """The next chunk of each topic and writer."""
+        self._writer: dict[str, str] = {}
+        """Who wrote the newest chunk of a topic."""
         self._decoders = {name: Decoder(TOPICS[name].message, TOPICS[name].limit) for name in LOGS}
 
     def serve(self) -> None:
@@ -59,10 +62,10 @@ class Server:
                 catch_up_at = now + CATCH_UP_EVERY
                 self._tell(self._translator.summary)
                 for role in self._translator.behind():
-                    self._catch_up(f"log/{role}", self._expected.get(f"log/{role}", ("", 0))[1])
+                    self._catch_up(f"log/{role}")
         if self._translator is not None:
             for topic in LOGS:
-                self._catch_up(topic, self._expected.get(topic, ("", 0))[1])
+                self._catch_up(topic)
         self._close()
 
     def _close(self) -> None:
@@ -81,11 +84,11 @@ class Server:
 
     def _meet(self) -> None:
         """Begin a recording if there is a run that is not yet recorded."""
-        world = self._bus.ask_one("world", World)
+        world = self._bus.ask_one("world")
         if world is None or world.run == self._run:
             return
         self._close()
-        self._run, self._expected = world.run, {}
+        self._run, self._expected, self._writer = world.run, {}, {}
         self._translator = self._start(world)
 
     def _take(self, topic: str, chunk: Any) -> None:
@@ -94,16 +97,17 @@ class Server:
             self._meet()
             if chunk.run != self._run:
                 return
-        writer, expected = self._expected.get(topic, ("", 0))
-        if chunk.writer != writer:
-            expected = 0
-        if chunk.seq > expected:
-            self._catch_up(topic, expected)
+        if self._writer.get(topic) not in (None, chunk.writer):
+            self._catch_up(topic)  # what the former one still has comes before
+        self._writer[topic] = chunk.writer
+        if chunk.seq > self._expected.get((topic, chunk.writer), 0):
+            self._catch_up(topic)
         self._write(topic, chunk)
 
-    def _catch_up(self, topic: str, seq: int) -> None:
-        """Ask the writer for what it still has from a chunk on."""
-        for payload in self._bus.ask(topic, LogRequest(seq)):
+    def _catch_up(self, topic: str) -> None:
+        """Ask the newest writer of a topic (anybody, if none is known) for the chunks that are missing."""
+        writer = self._writer.get(topic, "")
+        for payload in self._bus.ask(topic, LogRequest(self._expected.get((topic, writer), 0), writer)):
             try:
                 self._write(topic, self._decoders[topic](payload))
             except Refused as why:
@@ -112,10 +116,9 @@ class Server:
     def _write(self, topic: str, chunk: Any) -> None:
         if chunk.run != self._run or self._translator is None:
             return
-        writer, expected = self._expected.get(topic, ("", 0))
-        if chunk.writer == writer and chunk.seq < expected:
+        if chunk.seq < self._expected.get((topic, chunk.writer), 0):
             return
-        self._expected[topic] = chunk.writer, chunk.seq + 1
+        self._expected[topic, chunk.writer] = chunk.seq + 1
         {
             "log/sim": self._translator.sim,
             "log/sensors": self._translator.sensors,

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from phototaxis.bus import Bus
 from phototaxis.chunks import Chunks
-from phototaxis.messages import Readings, SensorsLog, State, World
+from phototaxis.messages import Readings, SensorsLog, State
 from phototaxis.protocol import Once
 
 from phototaxis_sensors.suite import SensorSuite
@@ -57,7 +57,7 @@ class Server:
         """The sensors of a run; None when its world is not to be had now (the state will come again)."""
         if self._session is not None and self._session.run == run:
             return self._session
-        world = self._bus.ask_one("world", World)
+        world = self._bus.ask_one("world")
         if world is None or world.run != run:
             return None
         self._log.flush()

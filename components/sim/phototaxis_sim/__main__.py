@@ -25,6 +25,8 @@ class Options(ComponentOptions, kw_only=True):
     """simulated seconds per second; 0: lockstep, as fast as the answers come"""
     run: Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
     """name of the run (default: date, time and a few random letters)"""
+    patience: Annotated[float, Meta(gt=0)] = 5.0
+    """seconds after which a driver that is there but silent loses the seat, if somebody else waits for it"""
     journal: str = ""
     """file that lets a killed simulation continue its run"""
 
@@ -42,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     def serve(bus: Bus) -> None:
         pace = Pace(arena.motion.control_period, options.speed)
-        Server(bus, simulation, pace, journal).serve()
+        Server(bus, simulation, pace, journal, options.patience).serve()
 
     run("sim", options, serve)
 

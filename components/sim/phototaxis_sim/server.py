@@ -1,5 +1,6 @@
 """The simulation on the bus: asks each tick, waits for its answer, keeps the seat and the status."""
 
+import sys
 import time
 from collections import deque
 from typing import Any
@@ -18,6 +19,8 @@ from phototaxis_sim.simulation import Simulation, Snapshot
 STATUS_EVERY = 0.2
 WAITS_AFTER = 0.5
 """Seconds without an answer after which the status says "waiting" and for whom."""
+HEIR_WITHIN = 3.0
+"""Seconds that a continued simulation keeps the seat for its former driver."""
 
 
 class Entry(msgspec.Struct, array_like=True):
@@ -33,12 +36,17 @@ class Server:
     """Drives a `Simulation` by the answers that come from the bus.
 
     With a journal that holds the same run, it continues where that run was killed: the episode's start
-    is restored and its commands are made again.
+    is restored and its commands are made again. A driver that is there but has not answered for `patience`
+    seconds loses the seat if somebody else waits for it.
     """
 
-    def __init__(self, bus: Bus, simulation: Simulation, pace: Pace, journal: Journal | None = None):
+    def __init__(
+        self, bus: Bus, simulation: Simulation, pace: Pace, journal: Journal | None = None, patience: float = 5.0
+    ):
         self._bus, self._sim, self._pace, self._journal = bus, simulation, pace, journal
-        self._seat, self._question = Seat(), Question()
+        self._patience, self._logged = patience, ""
+        self._heard_of, self._heard_at = "", 0.0
+        self._question = Question()
         self._alive: set[str] = set()
         self._held: Command | None = None
         self._paused = self._stopping = self._finished = False
@@ -52,6 +60,8 @@ class Server:
         self._log = Chunks(bus, "log/sim", self._chunk)
         if journal is not None:
             self._continue(journal)
+        self._seat = Seat(heir=simulation.state.author)
+        self._heir_until = time.monotonic() + HEIR_WITHIN
 
     def serve(self) -> None:
         """Run until a "stop" event or request."""
@@ -65,6 +75,7 @@ class Server:
                 self._tick_by_clock(now)
             elif self._question.due(now) and not self._finished:
                 self._publish()
+            self._mind_the_seat(now)
             self._log.poll(now)
             if now >= self._status_at:
                 self._announce(now)
@@ -92,10 +103,25 @@ class Server:
         elif event.topic == "gone":
             role, ident = event.message
             self._alive.discard(f"{role}/{ident}")
-            if role == "agent":
-                self._seat.leave(ident)
+            if role == "agent" and self._seat.leave(ident, self._sim.state.tick):
+                self._ask()
         elif event.topic == "stop":
             self._stopping = True
+
+    def _mind_the_seat(self, now: float) -> None:
+        """A free seat whose heir does not come, or a driver that keeps silent: the next one may sit down."""
+        tick = self._sim.state.tick
+        if self._seat.heir and not self._seat.driver and now > self._heir_until:
+            self._seat.heir = ""
+            if self._seat.vacate(tick):
+                self._ask()
+        if self._seat.driver != self._heard_of or self._held is not None or self._paused or self._finished:
+            self._heard_of, self._heard_at = self._seat.driver, now
+        elif self._seat.driver and self._seat.next(tick) and now - self._heard_at > self._patience:
+            line = f"{self._seat.driver} has been silent for {self._patience:g} s and loses the seat at tick {tick}"
+            print(f"sim: {line}", file=sys.stderr, flush=True)
+            self._seat.vacate(tick)
+            self._ask()
 
     def _command(self, command: Command) -> None:
         state = self._sim.state
@@ -106,7 +132,7 @@ class Server:
         if command.author != self._seat.driver or not command.author:
             return self._bus.refuse("command", f"not the driver: {command.author}")
         self._held = command
-        now = time.monotonic()
+        now = self._heard_at = time.monotonic()
         if self._started is None:
             self._started = now, state.tick
         self._pace.commanded(now)
@@ -146,6 +172,7 @@ class Server:
         self._advance(entry)
         if self._journal is not None and entry.end:
             self._journal.begin(self._header())
+        self._seat.boundary(self._sim.state.tick)
         self._ask()
         self._record(before)  # while the others compute
         if self._sim.ended is not None:
@@ -175,13 +202,12 @@ class Server:
     def _obey(self, request: Control) -> str:
         """Do what is asked; a reason when it is refused, else ""."""
         verb, now = request.verb, time.monotonic()
-        if verb == "claim":
-            reason = self._seat.claim(request.agent)
-            if not reason:
+        if verb in ("claim", "take over", "stand by", "release"):
+            driver = self._seat.driver
+            reason = self._reseat(request)
+            if self._seat.driver != driver:
                 self._ask()
             return reason
-        if verb == "release":
-            return "" if self._seat.leave(request.agent) else f"{request.agent} does not hold the seat"
         if verb == "pause":
             self._paused = True
         elif verb == "resume":
@@ -202,6 +228,20 @@ class Server:
         elif verb == "stop":
             self._bus.stop()
         return ""
+
+    def _reseat(self, request: Control) -> str:
+        """Do what an agent asks about the seat; a reason when it is refused, else ""."""
+        seat, agent, tick = self._seat, request.agent, self._sim.state.tick
+        if request.verb == "claim":
+            return seat.claim(agent, tick)
+        if request.verb == "stand by":
+            return seat.stand_by(agent, tick)
+        if request.verb == "release":
+            return "" if seat.leave(agent, tick) else f"{agent} does not hold the seat"
+        reason = seat.reserve(agent, request.at)
+        if not seat.driver:
+            seat.boundary(tick)
+        return reason
 
     def _phase(self, now: float) -> tuple[Phase, str, float]:
         """The phase, whom it waits for, and how long."""
@@ -227,7 +267,8 @@ class Server:
             tick=state.tick, epoch=state.epoch, epochs=sim.world.epochs, episode=state.episode,
             episodes=sim.episodes, reached=sim.reached,
             recent=sum(self._recent) / len(self._recent) if self._recent else 0.0,
-            rate=self._rate, mean_rate=self._mean_rate, driver=self._seat.driver, alive=sorted(self._alive),
+            rate=self._rate, mean_rate=self._mean_rate, driver=self._seat.driver, drivers=self._seat.history,
+            next=self._seat.waiting, alive=sorted(self._alive),
             refused=dict(self._bus.refused), hash=state.hash,
         )  # fmt: skip
 
@@ -242,6 +283,9 @@ class Server:
         self._bus.put("status", self._status(now))
 
     def _record(self, s: State) -> None:
+        if s.driver != self._logged:  # a chunk has one driver
+            self._log.flush()
+            self._logged = s.driver
         contact = s.front + 2 * s.rear
         row = (s.tick, s.episode, s.time, s.x, s.y, s.heading, s.left, s.right, contact)
         self._log.add(row, time.monotonic())
@@ -250,7 +294,7 @@ class Server:
         ended, self._ended = self._ended, []
         tick, episode, seconds, x, y, heading, left, right, contact = columns
         return SimLog(
-            self._sim.world.run, seq, self._bus.ident, self._seat.driver,
+            self._sim.world.run, seq, self._bus.ident, self._logged,
             tick, episode, seconds, x, y, heading, left, right, contact, ended,
         )  # fmt: skip
 

@@ -55,7 +55,9 @@ def success(path: Path, systems: Mapping[str, Runs], lines: Mapping[str, float],
         axes.plot(x, means, color=colour, marker=marker, linestyle=dashes, label=name, markersize=5)
     for name, level in lines.items():
         axes.axhline(100 * level, color="0.35", linewidth=0.9, linestyle=(0, (2, 2)))
-        axes.annotate(name, (1.0, 100 * level), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
+        left = name.startswith("the paper")  # the others may lie close to it
+        place, side = (0.01, "left") if left else (1.0, "right")
+        axes.annotate(name, (place, 100 * level), xycoords=("axes fraction", "data"), ha=side, va="bottom", fontsize=7)
     axes.set_xscale("log")
     axes.set_ylim(0, 104)
     axes.set_xlabel("learning steps (epochs)" if against == "epochs" else "episodes while learning (mean)")

@@ -70,9 +70,15 @@ SHADOWS: Plan = {
 }
 """Every kind of learner where obstacles shadow the light."""
 
-WHOLE: Plan = {**PAPER, **EXCHANGED, **DISCOUNTS, **PROPOSED, **BEYOND, **SHADOWS}
+PARTS: Mapping[str, Plan] = {
+    "paper": {**PAPER, **EXCHANGED, **DISCOUNTS, **PROPOSED},
+    "beyond": {**BEYOND, **SHADOWS},
+}
+"""What is computed one after the other, each in a folder of its own."""
+
+WHOLE: Plan = {name: planned for plan in PARTS.values() for name, planned in plan.items()}
 
 
-def cells(seeds: range) -> list[Cell]:
-    """Everything, with every seed."""
-    return [Cell(system, epochs, seed) for system, budgets in WHOLE.values() for epochs in budgets for seed in seeds]
+def cells(plan: Plan, seeds: range) -> list[Cell]:
+    """Everything that is planned, with every seed."""
+    return [Cell(system, epochs, seed) for system, budgets in plan.values() for epochs in budgets for seed in seeds]

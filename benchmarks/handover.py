@@ -1,0 +1,106 @@
+"""How long the robot waits when its driver changes: swapped, killed, frozen. Part of `make bench`."""
+
+import os
+import secrets
+import signal
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import pairwise
+from typing import Any
+
+from phototaxis.bus import Bus
+from phototaxis.messages import Decoder, State, Status
+from phototaxis.session import BusOptions, open_session
+
+DEADLINE = 30.0
+
+
+def measure(rounds: int) -> dict[str, tuple[float, float]]:
+    """Milliseconds from the last tick of the old driver to the first of the new one; and the same in usual ticks."""
+    ways = {"swapped (inherits over the bus)": None, "killed": signal.SIGKILL, "frozen (SIGSTOP)": signal.SIGSTOP}
+    found: dict[str, list[tuple[float, float]]] = {way: [] for way in ways}
+    for _ in range(rounds):
+        for way, number in ways.items():
+            found[way].append(_pause(number))
+    return {way: (_median(pairs, 0), _median(pairs, 1)) for way, pairs in found.items()}
+
+
+def _median(pairs: list[tuple[float, float]], place: int) -> float:
+    return statistics.median(pair[place] for pair in pairs)
+
+
+def _pause(number: signal.Signals | None) -> tuple[float, float]:
+    """The pause, ms, when the driver is sent a signal and a standby drives on, or (None) is swapped at tick 2,000."""
+    world, ticks = f"bench-{secrets.token_hex(3)}", dict[int, tuple[float, str]]()
+    decode = Decoder(State, 4096)
+
+    def note(sample: Any) -> None:
+        state = decode(sample.payload.to_bytes())
+        ticks.setdefault(state.tick, (time.perf_counter(), state.author))
+
+    with (
+        _process("sim", world),
+        _process("sensors", world),
+        open_session("observer", BusOptions(name=world)) as session,
+        Bus(session, world, "observer", "bench") as bus,
+        ExitStack() as agents,
+    ):
+        session.declare_subscriber(f"{world}/state", note)
+        if number is None:
+            agents.enter_context(_process("agent", world, "--ident", "new", "--take-over", "--at", "2000"))
+            _until(bus, lambda status: "new" in status.next)
+        old = agents.enter_context(_process("agent", world, "--ident", "old"))
+        _until(bus, lambda status: status.driver == "old")
+        if number is not None:
+            agents.enter_context(_process("agent", world, "--ident", "new", "--standby"))
+            _until(bus, lambda status: "new" in status.next)
+            _pass(bus, 500)
+            os.kill(old.pid, number)
+        _until(bus, lambda status: status.driver == "new")
+        _pass(bus, 200)
+    moments = [(*ticks[tick], tick) for tick in sorted(ticks)]
+    steps = [later[0] - earlier[0] for earlier, later in pairwise(moments)]
+    first = next(index for index, (_, author, _) in enumerate(moments) if author == "new")
+    pause = max(steps[first - 3 : first])  # an episode may begin just there: then nobody is the author of a tick
+    return 1000 * pause, pause / statistics.median(steps)
+
+
+def _pass(bus: Bus, ticks: int) -> None:
+    """Let some ticks pass."""
+    first: list[int] = []
+    _until(bus, lambda status: first.append(status.tick) or status.tick > first[0] + ticks)
+
+
+def _until(bus: Bus, wanted: Callable[[Status], bool]) -> None:
+    deadline = time.monotonic() + DEADLINE
+    while time.monotonic() < deadline:
+        event = bus.receive(timeout=0.1)
+        if event is not None and event.topic == "status" and wanted(event.message):
+            return
+    raise SystemExit("the system does not come up")
+
+
+@contextmanager
+def _process(role: str, world: str, *words: str) -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen(
+        [sys.executable, "-m", f"phototaxis_{role}", "--name", world, *words], stderr=subprocess.DEVNULL
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def lines(rounds: int) -> list[str]:
+    """What `measure` found, for a person."""
+    rows = [f"  {way:40} {pause:9.1f} {ticks:12.0f}" for way, (pause, ticks) in measure(rounds).items()]
+    return [f"  {'':40} {'pause, ms':>9} {'usual ticks':>12}", *rows]
+
+
+if __name__ == "__main__":
+    print("\n".join(lines(5)))

@@ -1,0 +1,88 @@
+"""The wire format as a page for those who write a component in another language, made from the tables and Structs."""
+
+import json
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+import msgspec
+
+from phototaxis import messages, protocol, rights, topics
+
+PAGE = files("phototaxis") / "wire.md.in"
+
+
+def page() -> str:
+    """docs/wire.md."""
+    defaults = {name: value.default for name, value in _parameters(protocol.Question).items()}
+    return Template(PAGE.read_text()).substitute(
+        schema=messages.SCHEMA,
+        topics=topics.table(),
+        limits=_limits(),
+        rights=rights.table(),
+        messages="\n\n".join(_message(topic) for topic in topics.TOPICS.values()),
+        json_schema=json.dumps(_schema(), indent=1),
+        first=f"{defaults['first']:g}",
+        most=f"{defaults['most']:g}",
+    )
+
+
+def _parameters(kind: type) -> dict[str, Any]:
+    from inspect import signature
+
+    return dict(signature(kind).parameters)
+
+
+def _limits() -> str:
+    rows = [
+        f"| `{topic.name}` | {topic.limit:,} | {f'{topic.reply_limit:,}' if topic.reply else '–'} |"
+        for topic in topics.TOPICS.values()
+    ]
+    return "\n".join(["| key | largest message or question, bytes | largest answer, bytes |", "|---|--:|--:|", *rows])
+
+
+def _message(topic: topics.Topic) -> str:
+    kinds = [topic.message, *([topic.reply] if topic.reply else [])]
+    return "\n\n".join(_fields(kind, topic.name) for kind in kinds)
+
+
+def _fields(kind: type[messages.Message], topic: str) -> str:
+    from phototaxis.options import field_help
+
+    texts = field_help(kind)
+    rows = [
+        f"| `{field.name}` | {_type(field.type)} | {'yes' if field.required else 'no'} | {texts.get(field.name, '')} |"
+        for field in msgspec.structs.fields(kind)
+    ]
+    about = " ".join((kind.__doc__ or "").split())
+    head = f"### {kind.__name__} (`{topic}`)\n\n{about}\n"
+    return "\n".join([head, "| field | type | required | |", "|---|---|---|---|", *rows])
+
+
+def _type(kind: Any) -> str:
+    """A field's type in JSON Schema's words, short."""
+    found = msgspec.json.schema(kind)
+    if "enum" in found:
+        return " or ".join(f'`"{one}"`' for one in found["enum"])
+    if "$ref" in found:
+        return f"[{found['$ref'].rsplit('/', 1)[1]}](#json-schema)"
+    if "anyOf" in found:
+        return " or ".join(one.get("type", one.get("$ref", "").rsplit("/", 1)[-1]) for one in found["anyOf"])
+    words = [found.get("type", "any")]
+    words += [f"{word} {found[key]}" for key, word in BOUNDS.items() if key in found]
+    return ", ".join(words)
+
+
+BOUNDS = {
+    "minimum": "from",
+    "maximum": "to",
+    "minItems": "at least",
+    "maxItems": "at most",
+    "maxLength": "at most",
+}
+
+
+def _schema() -> dict[str, Any]:
+    kinds = [kind for topic in topics.TOPICS.values() for kind in (topic.message, topic.reply) if kind]
+    _, components = msgspec.json.schema_components([*kinds, messages.LogRequest])
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$defs": components}

@@ -1,0 +1,93 @@
+"""`phototaxis check`: a live agent against the contract; the generated files against the code."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import zenoh
+from msgspec import Meta
+from phototaxis import rights, wire
+from phototaxis.errors import UserError
+from phototaxis.options import parse
+from phototaxis.router import router_config, text
+from phototaxis.session import BusOptions
+
+ROUTER = "deploy/zenoh/router.json5"
+WIRE = "docs/wire.md"
+CERTS = Path("/etc/phototaxis/certs")
+"""Where the shipped configuration looks for what `phototaxis certs` made."""
+
+
+class Options(BusOptions, kw_only=True):
+    """Options of `phototaxis check`."""
+
+    what: Literal["agent", "rights", "wire"]
+    """agent: a live agent, of whatever make, answers a simulation as it must. rights: who may write and read what, and
+    whether a router's configuration says so. wire: whether the page about the wire format is up to date"""
+    file: str = ""
+    """rights, wire: the file to compare (default: the one in the repository)"""
+    worlds: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*$")] = "phototaxis"
+    """rights: names of the worlds, separated by commas"""
+    write: bool = False
+    """rights, wire: write the file instead of comparing it"""
+    ticks: Annotated[int, Meta(ge=10, le=100_000)] = 200
+    """agent: how many ticks to ask"""
+    within: Annotated[float, Meta(gt=0, le=600)] = 1.0
+    """agent: seconds in which a tick must be answered"""
+    patience: Annotated[float, Meta(gt=0, le=600)] = 20.0
+    """agent: seconds to wait for one"""
+
+
+def main(argv: Sequence[str]) -> int:
+    about = "Check an agent, a router's rights, or the page about the wire format against the contract."
+    options = parse(Options, argv, "phototaxis check", about, positional=["what"])
+    if options.what == "agent":
+        from phototaxis_lab.check_agent import check
+
+        return check(options, options.ticks, options.within, options.patience)
+    return _rights(options) if options.what == "rights" else _wire(options)
+
+
+def _rights(options: Options) -> int:
+    worlds, file = options.worlds.split(","), Path(options.file or ROUTER)
+    if options.write:
+        config = router_config(worlds, ["tls/127.0.0.1:7447"], CERTS, "mtls")
+        _put(file, text(config, "phototaxis check rights --write"))
+        return 0
+    print(rights.table())
+    if not file.exists():
+        raise UserError(f"{file}: no such file; write it with: phototaxis check rights --write --file {file}")
+    try:
+        found = zenoh.Config.from_file(str(file))
+        ours = zenoh.Config.from_json5(text(router_config(worlds, [], CERTS, "mtls"), ""))
+        differing = [key for key in ("access_control", "low_pass_filter") if found.get_json(key) != ours.get_json(key)]
+    except zenoh.ZError as error:
+        raise UserError(f"{file}: not a Zenoh configuration: {str(error).splitlines()[0]}") from None
+    if differing:
+        raise UserError(
+            f"{file}: {' and '.join(differing)} differ from the tables of topics and roles (worlds: {options.worlds}); "
+            f"write it anew with --write"
+        )
+    print(f"{file} says the same", file=sys.stderr)
+    return 0
+
+
+def _wire(options: Options) -> int:
+    file = Path(options.file or WIRE)
+    if options.write:
+        _put(file, wire.page())
+    elif not file.exists() or file.read_text() != wire.page():
+        raise UserError(f"{file}: not up to date; write it anew with: phototaxis check wire --write")
+    else:
+        print(f"{file} is up to date", file=sys.stderr)
+    return 0
+
+
+def _put(file: Path, content: str) -> None:
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(content)
+    except OSError as error:
+        raise UserError(f"{file}: {error.strerror}") from None
+    print(file, file=sys.stderr)

@@ -1,0 +1,203 @@
+"""The contract of an agent, tried on a live one: this is the simulation and the sensors that it meets."""
+
+import sys
+import time
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from phototaxis.bus import Bus, Event
+from phototaxis.errors import ComponentFailed, Unavailable
+from phototaxis.messages import Command, Control, ControlReply, Readings, Status, World, encode, run_name
+from phototaxis.session import BusOptions, open_session
+from phototaxis.task import lit
+from phototaxis_sensors.suite import SensorSuite
+from phototaxis_sim import arenas
+from phototaxis_sim.simulation import Simulation
+
+SILENCE = 0.5
+"""Seconds in which something that must not come does not come."""
+
+
+class Verdict(NamedTuple):
+    """What became of one clause of the contract."""
+
+    clause: str
+    fault: str
+    """"" when it is kept."""
+
+
+def check(options: BusOptions, ticks: int, within: float, patience: float) -> int:
+    """Try the first agent that comes to the world `options.name`; a line for each clause.
+
+    Raises
+    ------
+    Unavailable
+        when no agent comes in `patience` seconds.
+    ComponentFailed
+        when a clause is broken.
+    """
+    with (
+        open_session("sim", options) as session,
+        open_session("sensors", options) as other,
+        Bus(session, options.name, "sim", "check") as sim,
+        Bus(other, options.name, "sensors", "check") as sensors,
+    ):
+        print(f"waiting for an agent in the world '{options.name}'", file=sys.stderr, flush=True)
+        broken = 0
+        for verdict in Trial(sim, sensors, within, patience).run(ticks):
+            broken += bool(verdict.fault)
+            print(
+                f"{'FAIL' if verdict.fault else 'pass'}  {verdict.clause}{': ' if verdict.fault else ''}{verdict.fault}"
+            )
+            sys.stdout.flush()
+    if broken:
+        raise ComponentFailed(f"the agent breaks {broken} clause{'s' if broken > 1 else ''} of the contract")
+    return 0
+
+
+class Trial:
+    """Leads one agent through the clauses."""
+
+    def __init__(self, sim: Bus, sensors: Bus, within: float, patience: float):
+        self._sim, self._sensors, self._within, self._patience = sim, sensors, within, patience
+        self._world = World(run_name(), arenas.load("paper"), 0, 0)
+        self._simulation = Simulation(self._world.arena, 0, self._world.run, 0)
+        self._suite = SensorSuite(self._world)
+        self._agent = ""
+        self._asked: Readings | None = None
+        self._answer = Command("", 0, "", 0.0, 0.0)
+        """The last one that was as it should be."""
+
+    def run(self, ticks: int) -> Iterator[Verdict]:
+        """The clauses in order; those that follow from a broken one are left out."""
+        yield self._arrives()
+        yield self._claims()
+        if not self._agent:
+            return
+        first = Verdict("answers the first readings that name it the driver", self._first())
+        yield first
+        if first.fault:
+            return
+        yield Verdict("repeats its answer, byte for byte, when a tick is asked again", self._repeats())
+        yield Verdict(f"answers {ticks} ticks once each, each within {self._within:g} s", self._drives(ticks))
+        yield Verdict("ends the episode when it has reached the light", self._reaches())
+        yield Verdict("keeps silent about an older tick", self._older())
+        yield Verdict("steps down when another one drives", self._steps_down())
+
+    def _arrives(self) -> Verdict:
+        if not self._sim.wait_for("agent", self._patience):
+            raise Unavailable(
+                f"no agent came within {self._patience:g} s; it must declare the liveliness token NAME/alive/agent/ID"
+            )
+        return Verdict("declares its liveliness token", "")
+
+    def _claims(self) -> Verdict:
+        """The readings of a world without a driver, repeated, until a claim comes."""
+        self._ask("")
+        self._await("control", self._patience)
+        fault = "" if self._agent else f"no claim within {self._patience:g} s"
+        return Verdict("claims a free seat", fault)
+
+    def _first(self) -> str:
+        self._ask(self._agent)
+        return self._fault(self._await("command", self._patience))
+
+    def _repeats(self) -> str:
+        before = self._answer
+        self._ask(self._agent)
+        after = self._await("command", self._within)
+        if after is None:
+            return "no answer"
+        return "" if encode(before) == encode(after) else f"first {before}, then {after}"
+
+    def _drives(self, ticks: int) -> str:
+        for _ in range(ticks):
+            answer = self._answer
+            self._simulation.advance(answer.left, answer.right, answer.author, answer.end)
+            self._ask(self._agent)
+            began = time.monotonic()
+            fault = self._fault(self._await("command", self._within))
+            if fault:
+                return f"tick {self._simulation.state.tick}: {fault}"
+            if time.monotonic() - began > self._within:
+                return f"tick {self._simulation.state.tick}: late"
+        extra = self._await("command", SILENCE, repeat=False)
+        return "" if extra is None else f"answered tick {extra.tick} twice without being asked again"
+
+    def _reaches(self) -> str:
+        answer = self._answer
+        self._simulation.advance(answer.left, answer.right, answer.author, answer.end)
+        self._ask(self._agent, light=(1.0, 1.0))
+        command = self._await("command", self._within)
+        fault = self._fault(command)
+        return fault or (
+            "" if command is not None and command.end == "reached" else f"its command does not end it: {command}"
+        )
+
+    def _older(self) -> str:
+        if self._asked is None:
+            return "nothing was asked"
+        newest, self._asked = self._asked, None
+        newest.tick -= 1
+        self._sensors.put("readings", newest)
+        command = self._await("command", SILENCE, repeat=False)
+        newest.tick += 1
+        return "" if command is None else f"it answered {command}"
+
+    def _steps_down(self) -> str:
+        self._simulation.advance(0.0, 0.0, self._agent, "reached")
+        self._ask("another")
+        command = self._await("command", SILENCE)
+        return "" if command is None else f"it answered {command}"
+
+    def _ask(self, driver: str, light: tuple[float, float] | None = None) -> None:
+        self._simulation.state.driver = driver
+        readings = self._suite(self._simulation.state)
+        if light is not None:
+            readings.light = light
+        assert light is None or lit(readings)  # noqa: S101
+        self._asked = readings
+        self._sensors.put("readings", readings)
+
+    def _fault(self, command: Command | None) -> str:
+        """What is wrong with an answer to what was asked last, if anything."""
+        tick = self._simulation.state.tick
+        if command is None:
+            refused = "; ".join(f"{why} × {count}" for why, count in self._sim.refused.items())
+            return f"no answer{f' ({refused})' if refused else ''}"
+        for name, found, expected in (
+            ("run", command.run, self._world.run),
+            ("tick", command.tick, tick),
+            ("author", command.author, self._agent),
+        ):
+            if found != expected:
+                return f"{name} is {found!r}, not {expected!r}"
+        self._answer = command
+        return ""
+
+    def _await(self, topic: str, timeout: float, repeat: bool = True) -> Command | None:
+        """The next command, or None after `timeout`; or, for "control", when the seat was claimed."""
+        deadline, again = time.monotonic() + timeout, time.monotonic() + 0.1
+        while (left := deadline - time.monotonic()) > 0:
+            event = self._sim.receive(timeout=min(left, 0.05))
+            if event is not None and event.topic == "command" and topic == "command":
+                return event.message
+            if event is not None and event.reply is not None:
+                self._reply(event)
+            if topic == "control" and self._agent:
+                return None
+            if topic == "control" and repeat and self._asked is not None and time.monotonic() > again:
+                again = time.monotonic() + 0.1
+                self._sensors.put("readings", self._asked)
+        return None
+
+    def _reply(self, event: Event) -> None:
+        if event.reply is None:
+            return
+        if event.topic == "world":
+            event.reply(self._world)
+        elif event.topic == "control" and isinstance(event.message, Control):
+            request = event.message
+            if request.verb in ("claim", "take over", "stand by"):
+                self._agent = self._agent or request.agent
+            event.reply(ControlReply(True, "", Status(self._world.run, "running", driver=self._agent)))

@@ -1,0 +1,88 @@
+"""`phototaxis certs`: certificates, passwords and Zenoh configurations for a guarded router and its clients."""
+
+import os
+import secrets
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from msgspec import Meta, Struct
+from phototaxis.errors import UserError
+from phototaxis.options import parse
+from phototaxis.rights import subject
+from phototaxis.router import Auth, client_config, router_config, text
+from phototaxis.topics import ROLES
+
+NAMES = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*$")]
+MADE_BY = "phototaxis certs"
+
+
+class Options(Struct, kw_only=True):
+    """Options of `phototaxis certs`."""
+
+    out: str = "certs"
+    """folder to make; it must not exist"""
+    worlds: NAMES = "phototaxis"
+    """names of the worlds, separated by commas"""
+    host: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.:-]+$")] = "localhost"
+    """name or address under which the clients reach the router"""
+    listen: Annotated[str, Meta(pattern=r"^[0-9a-fA-F.:]+$")] = "127.0.0.1"
+    """address that the router listens on; 0.0.0.0: all of its machine's"""
+    port: Annotated[int, Meta(ge=1, le=65535)] = 7447
+    """port of the router"""
+
+
+def main(argv: Sequence[str]) -> int:
+    about = (
+        "Make a certificate authority for trials, a certificate and a password for every component, and the Zenoh "
+        "configurations of a router that knows them and of its clients."
+    )
+    options = parse(Options, argv, "phototaxis certs", about)
+    folder = Path(options.out).resolve()
+    try:
+        folder.mkdir(mode=0o700, parents=True)
+    except FileExistsError:
+        raise UserError(f"--out {options.out}: exists already; remove it or choose another folder") from None
+    except OSError as error:
+        raise UserError(f"--out {options.out}: {error.strerror}") from None
+    make(folder, options.worlds.split(","), options.host, options.listen, options.port)
+    print(
+        f"{folder}: router-mtls.json5 and router-password.json5 for `phototaxis router --zenoh-config`, and for each "
+        f"component WORLD.ROLE.mtls.json5 and WORLD.ROLE.password.json5 for its --zenoh-config",
+        file=sys.stderr,
+    )
+    return 0
+
+
+def make(folder: Path, worlds: Sequence[str], host: str, listen: str, port: int) -> None:
+    """Everything, in an existing folder; private keys and passwords are readable by their owner alone."""
+    import trustme
+
+    authority = trustme.CA(organization_name="Phototaxis trials")
+    _write(folder / "ca.pem", authority.cert_pem.bytes())
+    names = [subject(world, role) for world in worlds for role in ROLES]
+    _certify(authority.issue_cert(*{host, "localhost", "127.0.0.1"}), folder, "router")
+    passwords = {name: secrets.token_urlsafe(18) for name in names}
+    _write(folder / "users.txt", "".join(f"{name}:{word}\n" for name, word in passwords.items()).encode())
+    door, here = f"tls/{listen}:{port}", f"tls/{host}:{port}"
+    ways: tuple[Auth, ...] = ("mtls", "password")
+    for auth in ways:
+        config = router_config(worlds, [door], folder, auth)
+        _write(folder / f"router-{auth}.json5", text(config, MADE_BY).encode())
+    for name in names:
+        _certify(authority.issue_cert(f"{name}.example", common_name=name), folder, name)
+        for auth in ways:
+            config = client_config(here, folder, name, auth, passwords[name])
+            _write(folder / f"{name}.{auth}.json5", text(config, MADE_BY).encode())
+
+
+def _certify(issued: Any, folder: Path, name: str) -> None:
+    chain = b"".join(pem.bytes() for pem in issued.cert_chain_pems)
+    _write(folder / f"{name}.pem", chain)
+    _write(folder / f"{name}.key", issued.private_key_pem.bytes())
+
+
+def _write(path: Path, content: bytes) -> None:
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        file.write(content)

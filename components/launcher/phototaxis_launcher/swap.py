@@ -1,0 +1,60 @@
+"""`phototaxis swap`: another learner takes the seat of a running system."""
+
+import json
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+from msgspec import Meta
+from phototaxis.bus import Bus
+from phototaxis.errors import Unavailable, UserError
+from phototaxis.messages import Launch, LaunchReply
+from phototaxis.options import Parser, add_options, convert
+from phototaxis.session import BusOptions, open_session
+
+LINKED_WITHIN = 2.0
+
+
+class Options(BusOptions, kw_only=True):
+    """Options of `phototaxis swap`. Those of `phototaxis agent` are understood too and given to the new agent."""
+
+    learner: str
+    """name of the learner that takes over"""
+    within: Annotated[float, Meta(gt=0, le=3600)] = 60.0
+    """seconds within which it must drive"""
+    json: bool = False
+    """print the answer as one JSON object"""
+
+
+def main(argv: Sequence[str]) -> int:
+    parser = Parser(
+        prog="phototaxis swap",
+        description="Hand the seat of a running system to a new agent, which inherits from one of its own kind.",
+        epilog="Options of `phototaxis agent` (see its --help) are passed on to the agent.",
+    )
+    add_options(parser, Options, positional=["learner"])
+    own, words = parser.parse_known_args(argv)
+    options = convert(Options, vars(own))
+    reply = _ask(options, Launch(["--learner", options.learner, *words]))
+    if reply.reason:
+        raise UserError(reply.reason)
+    if options.json:
+        print(json.dumps({"agent": reply.agent, "from_tick": reply.tick}))
+    else:
+        print(f"{reply.agent} drives from tick {reply.tick} on", file=sys.stderr)
+    return 0
+
+
+def _ask(options: Options, request: Launch) -> LaunchReply:
+    with open_session("observer", options) as session, Bus(session, options.name, "observer", "swap") as bus:
+        if not bus.wait_for("launcher", LINKED_WITHIN):
+            raise Unavailable(
+                f"no `phototaxis up` runs the world '{options.name}'; start the agent yourself: "
+                f"phototaxis agent --learner {options.learner} --take-over"
+            )
+        reply = bus.ask_one("launch", request, timeout=options.within)
+    if reply is None:
+        raise Unavailable(
+            f"the new agent did not take the seat within {options.within:g} s; see its log in the run's folder"
+        )
+    return reply

@@ -1,0 +1,47 @@
+"""Double Q-learning (van Hasselt 2010): two tables, each judged by the other; noise does not look like value."""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta, Struct
+from phototaxis.task import ACTIONS, Percept, State
+from phototaxis_agent.learner import Learner, Transition, discrete, stored
+
+
+class Hyperparameters(Struct, frozen=True, kw_only=True):
+    """Of the two tables."""
+
+    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.3
+    """learning rate"""
+    gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.75
+    """discount factor"""
+
+
+class DoubleQ(Learner):
+    """Acts on the mean of two tables; each learning step changes one of them, drawn by lot."""
+
+    Options = Hyperparameters
+
+    def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
+        self._options, self._rng = options, rng
+        self._allowed = list(discrete(percept).actions)
+        self._tables = np.zeros((2, *percept.sizes, len(ACTIONS)))
+
+    def values(self, state: State) -> list[float]:
+        return self._tables[(slice(None), *map(int, state))].mean(axis=0)[self._allowed].tolist()
+
+    def learn(self, transition: Transition) -> float:
+        chosen = int(self._rng.integers(2))
+        here = (chosen, *map(int, transition.state), transition.action)
+        following = self._tables[(slice(None), *map(int, transition.following))]
+        best = max(self._allowed, key=lambda action: following[chosen, action])
+        value = 0.0 if transition.terminated else self._options.gamma * following[1 - chosen, best]
+        error = transition.reward + value - self._tables[here]
+        self._tables[here] += self._options.alpha * error
+        return float(error)
+
+    def save(self) -> dict[str, np.ndarray]:
+        return {"tables": self._tables.copy()}
+
+    def load(self, arrays: dict[str, np.ndarray]) -> None:
+        self._tables[:] = stored(arrays, "tables", self._tables)

@@ -1,0 +1,40 @@
+"""An agent that knows nothing of this project but its wire format (docs/wire.md): it steers to the brighter side.
+
+phototaxis router --listen tcp/127.0.0.1:7447 &
+phototaxis sim --connect tcp/127.0.0.1:7447 &
+phototaxis sensors --connect tcp/127.0.0.1:7447 &
+python examples/foreign_agent.py tcp/127.0.0.1:7447
+"""
+
+import json
+import sys
+from queue import Empty, SimpleQueue
+
+import msgpack
+import zenoh
+
+endpoint, world, me = sys.argv[1], "".join(sys.argv[2:3]) or "phototaxis", "chaser"
+config = {"mode": "client", "connect": {"endpoints": [endpoint]}, "scouting": {"multicast": {"enabled": False}}}
+with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
+    inbox: SimpleQueue = SimpleQueue()
+    publisher = session.declare_publisher(f"{world}/command", congestion_control=zenoh.CongestionControl.BLOCK)
+    session.declare_subscriber(
+        f"{world}/readings", lambda sample: inbox.put(msgpack.unpackb(sample.payload.to_bytes()))
+    )
+    token = session.liveliness().declare_token(f"{world}/alive/agent/{me}")  # lasts as long as the variable
+    newest, claim = -1, msgpack.packb({"verb": "claim", "agent": me})
+    while True:
+        try:
+            readings = inbox.get(timeout=30)
+        except Empty:
+            break  # the world is gone
+        if not readings["driver"]:
+            list(session.get(f"{world}/control", payload=claim, timeout=2))
+        elif readings["driver"] == me and readings["tick"] >= newest:
+            newest = readings["tick"]
+            left, right = readings["light"]
+            ahead = min(readings["sonar"][3:5]) > 0.5
+            motors = ((0, 1) if left > right else (1, 0)) if ahead else (-1, 1)
+            end = "reached" if max(left, right) > 0.95 else ""
+            answer = {"run": readings["run"], "tick": newest, "author": me, "end": end}
+            publisher.put(msgpack.packb(answer | {"left": motors[0], "right": motors[1]}))
