@@ -46,7 +46,7 @@ def system(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
     name = f"phototaxis-test-{secrets.token_hex(3)}"
     bus, grpc, web = (free_port() for _ in range(3))
     environment = {
-        "PHOTOTAXIS_TAG": "test",
+        "PHOTOTAXIS_TAG": name,
         "PHOTOTAXIS_HEALTH_INTERVAL": "2s",
         "PHOTOTAXIS_BUS_PORT": str(bus),
         "PHOTOTAXIS_GRPC_PORT": str(grpc),
@@ -70,4 +70,4 @@ def system(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
         }
         yield system
     finally:
-        system.compose("down", "--volumes", "--remove-orphans", check=False)
+        system.compose("--profile", "*", "down", "--volumes", "--rmi", "all", check=False)

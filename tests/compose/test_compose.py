@@ -16,7 +16,9 @@ SERVICES = ("router", *sorted(ROLES))
 
 
 def test_it_comes_up_healthy_and_ticks(system: System, capsys: pytest.CaptureFixture[str]):
-    sizes = docker("images", "--filter", "reference=phototaxis-*:test", "--format", "{{.Repository}} {{.Size}}")
+    sizes = docker(
+        "images", "--filter", f"reference=phototaxis-*:{system.name}", "--format", "{{.Repository}} {{.Size}}"
+    )
     with capsys.disabled():
         print(f"\n{sizes}" + "\n".join(f"{what}: {seconds:.1f} s" for what, seconds in system.figures.items()))
     with system.bus() as bus:
@@ -106,7 +108,8 @@ def test_another_learner_takes_the_seat(system: System):
 
 
 def test_down_leaves_nothing(system: System):
-    system.compose("--profile", "ann", "down", "--volumes")
+    system.compose("--profile", "*", "down", "--volumes", "--rmi", "all")
     label = f"label=com.docker.compose.project={system.name}"
     for what in (["ps", "-a"], ["network", "ls"], ["volume", "ls"]):
         assert docker(*what, "-q", "--filter", label) == ""
+    assert docker("images", "-q", "--filter", f"reference=*:{system.name}") == ""
