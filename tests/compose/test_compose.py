@@ -52,7 +52,7 @@ def test_the_page_and_the_stream_answer_on_the_published_ports(system: System, t
     source = f"rerun+http://127.0.0.1:{system.grpc_port}/proxy"
     with system.bus() as bus:
         now = system.until(bus, lambda status: status.phase == "running")
-        viewer = subprocess.Popen([RERUN, "--save", file, source], stderr=subprocess.PIPE)
+        viewer = subprocess.Popen([RERUN, "--port", "auto", "--save", file, source], stderr=subprocess.PIPE)
         try:
             deadline = time.monotonic() + DEADLINE
             while (newest := newest_tick(file)) < now.tick:
