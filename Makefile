@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 TEST ?= tests
 
-.PHONY: help setup demo test check bench clean
+.PHONY: help setup demo test check bench picture clean
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' Makefile | column -t -s '|'
@@ -31,6 +31,9 @@ check: setup ## style, types
 
 bench: setup ## measure rates and costs on this machine
 	@$(BIN)/python benchmarks/run.py
+
+picture: setup ## the README's picture and animation, from a real run
+	@scripts/picture
 
 clean: ## remove .venv and caches; runs/ stays
 	rm -rf $(VENV) .pytest_cache .ruff_cache

@@ -70,6 +70,4 @@ def system(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
         }
         yield system
     finally:
-        system.compose("down", "--volumes", "--remove-orphans", check=False)
-        images = docker("images", "--filter", f"reference=phototaxis-*:{name}", "--format", "{{.Repository}}:{{.Tag}}")
-        docker("image", "rm", *images.split(), check=False)
+        system.compose("--profile", "*", "down", "--volumes", "--rmi", "all", check=False)

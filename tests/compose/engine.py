@@ -74,9 +74,8 @@ class System:
     def healthy(self, bus: Bus, service: str) -> dict[str, Any]:
         """Wait until a service's container is healthy; what the engine knows of it then."""
         deadline = time.monotonic() + DEADLINE
-        while time.monotonic() < deadline:
-            found = self.inspect(service)
-            if found["State"].get("Health", {}).get("Status") == "healthy":
-                return found
+        while (found := self.inspect(service))["State"].get("Health", {}).get("Status") != "healthy":
+            if time.monotonic() > deadline:
+                raise AssertionError(f"{service} is not healthy: {found['State']}\n{self.compose('logs', service)}")
             bus.receive(timeout=0.2)
-        raise AssertionError(f"{service} is not healthy: {found['State']}\n{self.compose('logs', service)}")
+        return found

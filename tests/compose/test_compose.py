@@ -1,7 +1,6 @@
 """docker compose for real: it comes up, answers where it says, survives kills, swaps the learner, leaves nothing."""
 
 import subprocess
-import sys
 import time
 import urllib.request
 from pathlib import Path
@@ -10,15 +9,16 @@ import pytest
 from engine import DEADLINE, System, docker
 from phototaxis.errors import Unavailable
 from phototaxis.messages import Status
-from rerun.chunk import RrdReader
+from rerun_files import RERUN, newest_tick
 
-RERUN = Path(sys.executable).with_name("rerun")
 ROLES = {"sim", "sensors", "agent", "recorder"}
 SERVICES = ("router", *sorted(ROLES))
 
 
 def test_it_comes_up_healthy_and_ticks(system: System, capsys: pytest.CaptureFixture[str]):
-    sizes = docker("images", "--filter", f"reference=phototaxis-*:{system.name}", "--format", "{{.Repository}} {{.Size}}")
+    sizes = docker(
+        "images", "--filter", f"reference=phototaxis-*:{system.name}", "--format", "{{.Repository}} {{.Size}}"
+    )
     with capsys.disabled():
         print(f"\n{sizes}" + "\n".join(f"{what}: {seconds:.1f} s" for what, seconds in system.figures.items()))
     with system.bus() as bus:
@@ -52,28 +52,16 @@ def test_the_page_and_the_stream_answer_on_the_published_ports(system: System, t
     source = f"rerun+http://127.0.0.1:{system.grpc_port}/proxy"
     with system.bus() as bus:
         now = system.until(bus, lambda status: status.phase == "running")
-        viewer = subprocess.Popen([RERUN, "--save", file, source], stderr=subprocess.PIPE)
+        viewer = subprocess.Popen([RERUN, "--port", "auto", "--save", file, source], stderr=subprocess.PIPE)
         try:
             deadline = time.monotonic() + DEADLINE
-            while newest_tick(file) < now.tick:
-                assert time.monotonic() < deadline, f"newest tick {newest_tick(file)} of {now.tick}"
+            while (newest := newest_tick(file)) < now.tick:
+                assert time.monotonic() < deadline, f"newest tick {newest} of {now.tick}"
                 assert viewer.poll() is None, viewer.communicate()
                 bus.receive(timeout=0.5)
         finally:
             viewer.terminate()
             viewer.communicate()
-
-
-def newest_tick(file: Path) -> int:
-    """The newest pose in a file that is being written; −1 before there is one."""
-    ticks = [-1]
-    try:
-        for chunk in RrdReader(file).stream():
-            if str(chunk.entity_path) == "/world/robot" and not chunk.is_static:
-                ticks += chunk.to_record_batch()["tick"].to_pylist()
-    except Exception:  # noqa: S110 - it ends in the middle of a message
-        pass
-    return max(ticks)
 
 
 @pytest.mark.parametrize("service", ["sensors", "agent", "recorder", "router", "sim"])
@@ -120,7 +108,8 @@ def test_another_learner_takes_the_seat(system: System):
 
 
 def test_down_leaves_nothing(system: System):
-    system.compose("--profile", "ann", "down", "--volumes")
+    system.compose("--profile", "*", "down", "--volumes", "--rmi", "all")
     label = f"label=com.docker.compose.project={system.name}"
     for what in (["ps", "-a"], ["network", "ls"], ["volume", "ls"]):
         assert docker(*what, "-q", "--filter", label) == ""
+    assert docker("images", "-q", "--filter", f"reference=*:{system.name}") == ""

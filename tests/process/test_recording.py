@@ -1,29 +1,15 @@
 """The recording holds every tick, verifies, and shows what it should."""
 
+import json
 import os
 import signal
 import socket
 import subprocess
-import sys
 import urllib.request
 from pathlib import Path
-from typing import Any
 
-from rerun.chunk import RrdReader
-from support import children, observer, result, wait, wait_status
-
-RERUN = str(Path(sys.executable).with_name("rerun"))
-
-
-def series(file: str, entity: str, component: str) -> dict[int, Any]:
-    """tick → value of one component of one entity."""
-    found = {}
-    for chunk in RrdReader(file).stream():
-        if str(chunk.entity_path) == entity and not chunk.is_static:
-            batch = chunk.to_record_batch()
-            if component in batch.schema.names:
-                found.update(zip(batch["tick"].to_pylist(), batch[component].to_pylist(), strict=True))
-    return found
+from rerun_files import RERUN, newest_tick, salvaged, series
+from support import children, observer, phototaxis, result, wait, wait_status
 
 
 def test_every_tick_is_in_the_recording(up):
@@ -88,3 +74,59 @@ def test_the_viewers_page_lives_and_dies_with_the_recorder(start, world, tmp_pat
     assert Path(found["recording"]).name == "recording-2.rrd"
     with socket.create_server(("127.0.0.1", port)):  # the page is gone, its port is free
         pass
+
+
+def test_a_killed_recorder_loses_at_most_the_last_second(start, world, tmp_path):
+    place, speed = ["--name", world], 20
+    started = [
+        start("recorder", *place, "--output", tmp_path / "r.rrd", "--grpc-port", 0, "--web-port", -1),
+        start("sim", *place, "--speed", speed),
+        start("sensors", *place),
+        start("agent", *place),
+    ]
+    second = round(speed / 0.5)
+    with observer(world) as bus:
+        for ticks in (second, second + 17, second + 38):
+            status = wait_status(bus, lambda status, least=ticks: status.tick > 2 * least, *started)
+        started[0].kill()
+    assert newest_tick(tmp_path / "r.rrd") >= status.tick - second
+    whole = subprocess.run([RERUN, "rrd", "verify", salvaged(tmp_path / "r.rrd")], capture_output=True, check=False)
+    assert whole.returncode == 0, whole.stderr
+
+
+def test_another_run_is_another_recording(start, world, tmp_path):
+    place = ["--name", world]
+    recorder = start("recorder", *place, "--output", tmp_path, "--grpc-port", 0, "--web-port", -1)
+    others = [start("sensors", *place), start("agent", *place)]
+    ends = {}
+    for run in ("first", "second"):
+        sim = start("sim", *place, "--run", run, "--epochs", 300)
+        with observer(world) as bus:
+            end = wait_status(bus, lambda status, run=run: status.run == run and status.phase == "finished", sim)
+            wait_for_recorder(bus, tmp_path / f"{run}.json", end.tick)
+        ends[run] = end.tick
+        assert sim.stop() == 0
+    assert recorder.stop() == 0
+    for process in others:
+        process.stop()
+    for run in ("first", "second"):
+        file = tmp_path / f"{run}.rrd"
+        assert subprocess.run([RERUN, "rrd", "verify", file], capture_output=True, check=False).returncode == 0
+        assert sorted(series(file, "/plots/reward", "Scalars:scalars")) == list(range(ends[run] + 1))
+        assert sorted(series(file, "/world/trail", "Points2D:positions")) == list(range(ends[run] + 1))
+    listed = phototaxis("recordings", "--out", tmp_path, "--json")
+    found = [json.loads(line) for line in listed.stdout.splitlines()]
+    assert [recording["run"] for recording in found] == ["second", "first"]
+    assert all(recording["arena"] == "paper" and recording["episodes"] > 0 for recording in found)
+    kept = phototaxis("recordings", "--out", tmp_path, "--max-size", 0)
+    assert kept.returncode == 0
+    assert len(list(tmp_path.glob("*.rrd"))) == 2, "what has just been written stays"
+    for file in tmp_path.glob("*.rrd"):
+        os.utime(file, (0, 0))
+    assert phototaxis("recordings", "--out", tmp_path, "--max-age", 1).returncode == 0
+    assert not list(tmp_path.glob("*.rrd"))
+
+
+def wait_for_recorder(bus, file: Path, tick: int) -> None:
+    """Until the summary beside a recording tells of a tick."""
+    wait(bus, lambda _: file.exists() and json.loads(file.read_text())["tick"] >= tick)

@@ -76,7 +76,7 @@ def as_object(recording: Recording) -> dict[str, object]:
 
 def table(found: list[Recording]) -> list[str]:
     """The recordings as aligned lines."""
-    rows = [("recording", "run", "arena", "drivers", "epochs", "success", "MB")]
+    rows: list[tuple[str, ...]] = [("recording", "run", "arena", "drivers", "epochs", "success", "MB")]
     for file, size, _, summary in found:
         known = ("?",) * 5
         if summary is not None:

@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -28,6 +29,10 @@ class Options(msgspec.Struct, kw_only=True):
     """folder of the runs"""
     web: bool = False
     """in the browser; so too where there is no display"""
+    picture: str = ""
+    """without a display, write what the viewer shows into this file: .png, or .gif for an animation"""
+    seconds: Annotated[float, Meta(ge=1, le=60)] = 5.0
+    """when the picture is taken, and how long the animation is"""
     grpc_port: PORT = 9876
     """the recorder's port, for the live view; with a RUN in the browser, the port that serves it"""
     web_port: PORT = 9090
@@ -39,9 +44,12 @@ def main(argv: Sequence[str]) -> int:
     run = [words.pop(0)] if words and not words[0].startswith("-") else []
     about = "Open the live view, or with RUN (a file, a run's name, or last) a recording, in the same layout."
     options = parse(Options, [*(f"--run={name}" for name in run), *words], "phototaxis view", about)
+    if options.picture and Path(options.picture).suffix not in (".png", ".gif"):
+        raise UserError(f"--picture {options.picture}: it must end in .png or .gif")
     web = options.web or not has_display()
     if options.run:
-        return show(str(find(options.run, Path(options.out))), options, web)
+        with tempfile.TemporaryDirectory(prefix="phototaxis-") as folder:
+            return show(str(whole(find(options.run, Path(options.out)), Path(folder))), options, web)
     try:
         socket.create_connection(("127.0.0.1", options.grpc_port), timeout=2).close()
     except OSError:
@@ -49,6 +57,8 @@ def main(argv: Sequence[str]) -> int:
             f"nothing is being recorded on port {options.grpc_port}; start a run with: phototaxis up, "
             "or look at a finished one with: phototaxis view last"
         ) from None
+    if options.picture:
+        return draw(f"rerun+http://127.0.0.1:{options.grpc_port}/proxy", options)
     if web:
         print(viewer_url(options.web_port, options.grpc_port))
         return 0
@@ -80,8 +90,33 @@ def find(run: str, folder: Path) -> Path:
     raise UserError(f"no recording of a run '{run}' in {folder}; see: phototaxis recordings --out {folder}")
 
 
+def whole(file: Path, folder: Path) -> Path:
+    """The recording itself, or where its recorder was killed or still writes, a copy of all that can be read of it."""
+    rrd = [rerun(), "rrd"]
+    if subprocess.run([*rrd, "verify", file], capture_output=True, check=False).returncode == 0:
+        return file
+    with file.open("rb") as found:
+        if not found.read(3) == b"RRF":
+            raise UserError(f"{file}: not a Rerun recording")
+    copy = folder / file.name
+    with copy.open("wb") as out:
+        done = subprocess.run([*rrd, "merge", "--continue-on-error", file], stdout=out, stderr=subprocess.DEVNULL)
+    if done.returncode:
+        raise UserError(f"{file}: nothing of this recording can be read")
+    return copy
+
+
+def rerun() -> Path:
+    """Rerun's own program; the script of the same name would leave it an orphan."""
+    import rerun_cli
+
+    return Path(rerun_cli.__file__).parent / "rerun"
+
+
 def show(file: str, options: Options, web: bool) -> int:
     """A finished recording, until Ctrl-C or until the window is closed."""
+    if options.picture:
+        return draw(file, options)
     if not web:
         return native(file)
     for port, flag in ((options.grpc_port, "--grpc-port"), (options.web_port, "--web-port")):
@@ -94,12 +129,17 @@ def show(file: str, options: Options, web: bool) -> int:
     return native("--serve-web", "--bind", "127.0.0.1", *ports, file)
 
 
-def native(*words: str) -> int:
-    """Run Rerun's program; the script of the same name would leave it an orphan."""
-    import rerun_cli
+def draw(source: str, options: Options) -> int:
+    """The picture that is asked for."""
+    from phototaxis_launcher.headless import picture
 
-    program = Path(rerun_cli.__file__).parent / "rerun"
-    viewer = subprocess.Popen([program, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    picture(source, Path(options.picture), options.seconds)
+    return 0
+
+
+def native(*words: str) -> int:
+    """Run Rerun's program until it ends, or Ctrl-C."""
+    viewer = subprocess.Popen([rerun(), *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     signal.signal(signal.SIGTERM, lambda *_: viewer.terminate())
     try:
         _, errors = viewer.communicate()

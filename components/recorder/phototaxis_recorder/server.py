@@ -13,6 +13,7 @@ from phototaxis_recorder.translate import Translator
 
 FLUSH_EVERY = 0.15
 CATCH_UP_EVERY = 1.0
+"""Seconds after which a silent topic, or one that lags, is asked for what was missed."""
 LOGS = ("log/sim", "log/sensors", "log/agent")
 
 
@@ -40,6 +41,8 @@ class Server:
         """The next chunk of each topic and writer."""
         self._writer: dict[str, str] = {}
         """Who wrote the newest chunk of a topic."""
+        self._heard: dict[str, float] = {}
+        """When the newest chunk of a topic came."""
         self._decoders = {name: Decoder(TOPICS[name].message, TOPICS[name].limit) for name in LOGS}
 
     def serve(self) -> None:
@@ -61,8 +64,10 @@ class Server:
             if self._translator is not None and now >= catch_up_at:
                 catch_up_at = now + CATCH_UP_EVERY
                 self._tell(self._translator.summary)
-                for role in self._translator.behind():
-                    self._catch_up(f"log/{role}")
+                behind = self._translator.behind()
+                for topic in LOGS:
+                    if topic.removeprefix("log/") in behind or now - self._heard.get(topic, 0.0) > CATCH_UP_EVERY:
+                        self._catch_up(topic)
         if self._translator is not None:
             for topic in LOGS:
                 self._catch_up(topic)
@@ -99,7 +104,7 @@ class Server:
                 return
         if self._writer.get(topic) not in (None, chunk.writer):
             self._catch_up(topic)  # what the former one still has comes before
-        self._writer[topic] = chunk.writer
+        self._writer[topic], self._heard[topic] = chunk.writer, time.monotonic()
         if chunk.seq > self._expected.get((topic, chunk.writer), 0):
             self._catch_up(topic)
         self._write(topic, chunk)

@@ -175,7 +175,7 @@ class Translator:
             rr.log("learner/policy/best", policy.arrows(percept, table, visits), recording=log)
             rr.log("learner/policy/here", policy.present(percept, chunk.state[-1]), recording=log)
 
-    def _text(self, tick: int, text: str, level: str = rr.TextLogLevel.INFO) -> None:
+    def _text(self, tick: int, text: str, level: rr.TextLogLevel = rr.TextLogLevel.INFO) -> None:
         self._at(tick)
         rr.log("episodes", rr.TextLog(text, level=level), recording=self._recording)
 

@@ -1,0 +1,61 @@
+"""What the live view is made of: light, colours, policy; and which recordings are removed."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from phototaxis.arena import Arena, Light, Wall
+from phototaxis.recordings import Recording
+from phototaxis.task import ACTIONS, PERCEPTS
+from phototaxis_launcher.recordings import DAY, MEGABYTE, excess
+from phototaxis_recorder import policy
+from phototaxis_recorder.colors import of_distance, of_reward
+from phototaxis_recorder.field import CELLS, light_field
+from phototaxis_sensors.light import LightModel
+from phototaxis_sensors.scene import Scene
+
+
+def test_the_field_is_what_an_eye_there_reads():
+    arena = Arena("a", (6.0, 6.0), [Light((3.0, 3.0))], walls=[Wall((1.5, 2.0), (1.5, 4.0))])
+    arena = msgspec.structs.replace(
+        arena,
+        robot=msgspec.structs.replace(arena.robot, light_sensors=((0.0, 0.0), (0.0, 0.0))),
+        sensing=msgspec.structs.replace(arena.sensing, body_shadow=False),
+    )
+    field, eye = light_field(arena), LightModel(arena, Scene(arena))
+    assert field.shape == (CELLS, CELLS)
+    cell = 6.0 / CELLS
+    for row, column in ((5, 5), (60, 10), (60, 40), (90, 100), (60, 60)):
+        x, y = (column + 0.5) * cell, (row + 0.5) * cell
+        assert field[row, column] == pytest.approx(eye(x, y, 0.0)[0], abs=1e-9)
+    assert field[60, 10] == 0.0, "behind the wall"
+
+
+def test_colours_tell_near_from_far_and_good_from_bad():
+    near, far = (color.tobytes() for color in of_distance(np.array([0.1, 6.0])))
+    bad, none, good, unknown = of_reward(np.array([-2.0, 0.0, 3.0, np.nan])).tolist()
+    assert near != far
+    assert len({bad, none, good}) == 3
+    assert unknown == none
+
+
+@pytest.mark.parametrize("name", ["simple", "rich"])
+def test_each_state_has_its_place_in_the_picture_of_the_policy(name: str):
+    places = policy.cells(PERCEPTS[name].sizes)
+    assert len({tuple(place) for place in places.tolist()}) == len(places) == np.prod(PERCEPTS[name].sizes)
+
+
+def test_the_arrow_points_where_the_action_drives():
+    assert policy.heading(ACTIONS.index((1.0, 1.0)))[1] < 0, "forward is up"
+    assert policy.heading(ACTIONS.index((-1.0, 1.0)))[0] < 0, "a turn to the left points left"
+    assert policy.heading(ACTIONS.index((0.0, 0.0))) == (0.0, 0.0)
+
+
+def test_old_and_excessive_recordings_go_and_the_one_in_use_stays():
+    now = 100.0 * DAY
+    found = [Recording(Path(str(age)), 10 * MEGABYTE, now - age * DAY, None) for age in (0, 1, 2, 3)]
+    assert excess(found, now, None, None) == []
+    assert [one.file.name for one in excess(found, now, 1.5, None)] == ["2", "3"]
+    assert [one.file.name for one in excess(found, now, None, 25)] == ["2", "3"]
+    assert [one.file.name for one in excess(found, now, 0, 0)] == ["1", "2", "3"]
