@@ -45,7 +45,7 @@ def router_config(worlds: Sequence[str], listen: Sequence[str], folder: PurePath
 def client_config(connect: str, folder: PurePath, name: str, auth: Auth, password: str = "") -> dict[str, Any]:
     """Of one component, whose name at the router is `name`."""
     tls = {"root_ca_certificate": str(folder / "ca.pem"), "verify_name_on_connect": True}
-    transport: dict[str, Any] = {"link": {"tls": tls, "tx": {"lease": 1000}}, "unicast": {"qos": {"enabled": False}}}
+    transport: dict[str, Any] = {"link": {"tls": tls, "tx": {"lease": 1000}}}
     if auth == "mtls":
         tls |= {
             "connect_certificate": str(folder / f"{name}.pem"),
