@@ -16,6 +16,7 @@ ALLOWED = {
     "agent": set(),
     "recorder": set(),
     "launcher": set(),
+    "gym": {"sim", "sensors"},  # a world in one process
     "lab": {"sim", "sensors", "agent"},  # its purpose is to put them into one process
 }
 

@@ -1,25 +1,11 @@
 """A frozen agent for many robots at once: the same percepts, values and draws as `Agent`, in arrays."""
 
-from typing import NamedTuple
-
 import numpy as np
-from phototaxis.task import ACTIONS, Memory
+from phototaxis.task import ACTIONS, CrowdReadings, Memory
 
 from phototaxis_agent.agent import Agent
 
 _MOTORS = np.array(ACTIONS)
-
-
-class CrowdReadings(NamedTuple):
-    """What N robots sense at one tick; the fields of `Readings` that percepts read."""
-
-    sonar: np.ndarray
-    """(16, N) m."""
-    light: np.ndarray
-    """(2, N) 0..1: front left, front right."""
-    front: np.ndarray
-    """(N,) bool."""
-    rear: np.ndarray
 
 
 class CrowdAgent:

@@ -8,8 +8,9 @@ robot (numbers) and many at once (an array of shape (N,) wherever one robot has 
 import math
 from collections import deque
 from itertools import combinations
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal, NamedTuple, Protocol
 
+import numpy as np
 from msgspec import Meta, Struct
 
 REACHED = 0.95
@@ -63,6 +64,18 @@ class Senses(Protocol):
 
     @property
     def rear(self) -> Any: ...
+
+
+class CrowdReadings(NamedTuple):
+    """What N robots sense at one tick; the fields of `Readings` that percepts read."""
+
+    sonar: np.ndarray
+    """(16, N) m."""
+    light: np.ndarray
+    """(2, N) 0..1: front left, front right."""
+    front: np.ndarray
+    """(N,) bool."""
+    rear: np.ndarray
 
 
 def lit(senses: Senses) -> bool:
@@ -254,6 +267,18 @@ class Reward(Struct, frozen=True):
         if self.scheme == "potential":
             return math.log(max(brighter, DARK) / max(brightest, DARK))
         return brighter - brightest
+
+    def many(self, brightest: np.ndarray, now: Any, unchanged: np.ndarray) -> np.ndarray:
+        """The same for N robots: all (N,), `now` readings of arrays."""
+        brighter = np.maximum(*now.light)
+        if self.scheme == "static":
+            gain = np.where(brighter > brightest, self.approach, 0.0)
+        elif self.scheme == "potential":
+            gain = np.log(np.maximum(brighter, DARK) / np.maximum(brightest, DARK))
+        else:
+            gain = brighter - brightest
+        cases = lit(now), now.front | now.rear, unchanged
+        return np.select(cases, (self.goal, self.collision, self.unchanged), gain)
 
 
 REWARDS: dict[str, Reward] = {

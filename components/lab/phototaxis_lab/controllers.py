@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from phototaxis.task import ACTIONS, FRONT, LEFT, RIGHT
-from phototaxis_agent.crowd import CrowdReadings
+from phototaxis.task import ACTIONS, FRONT, LEFT, RIGHT, CrowdReadings
 
 GAIN = 12.0
 """How strongly the Braitenberg controller turns for a contrast between its two sensors."""

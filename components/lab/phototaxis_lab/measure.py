@@ -7,9 +7,9 @@ import numpy as np
 from msgspec import Struct
 from phototaxis.arena import Arena
 from phototaxis.messages import World
-from phototaxis.task import REACHED, lit
+from phototaxis.task import REACHED, CrowdReadings, lit
 from phototaxis_agent.agent import Agent
-from phototaxis_agent.crowd import CrowdAgent, CrowdReadings
+from phototaxis_agent.crowd import CrowdAgent
 from phototaxis_sensors.crowd import CrowdSuite
 from phototaxis_sim.crowd import Crowd
 from phototaxis_sim.physics import Physics, Pose

@@ -35,7 +35,7 @@ class Crowd:
         self._arena, self._count = arena, len(poses)
         self._one = Physics(arena) if arena.motion.collision == "stall" else None
         self._space = new_space(arena)
-        bodies = [self._add(pose) for pose in poses]
+        bodies = self._bodies = [self._add(pose) for pose in poses]
         self._mass, self._moment = bodies[0].mass, bodies[0].moment
         self._ids = np.array([body.id for body in bodies], np.uintp)
         self._order = np.argsort(self._ids)
@@ -52,6 +52,15 @@ class Crowd:
             self._stall(self._one, left, right)
         else:
             self._slide(speed, turn)
+
+    def place(self, row: int, pose: Pose) -> None:
+        """Put one robot at rest at a pose."""
+        body = self._bodies[row]
+        body.position, body.angle = pose[:2], pose.heading
+        body.velocity, body.angular_velocity = (0, 0), 0
+        self._space.reindex_shapes_for_body(body)
+        self.poses[row] = pose
+        self.front[row] = self.rear[row] = False
 
     def _add(self, pose: Pose) -> pymunk.Body:
         body, box = add_robot(self._space, self._arena)

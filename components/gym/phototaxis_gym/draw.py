@@ -1,0 +1,80 @@
+"""Pictures of the arena."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from phototaxis.arena import Arena
+from PIL import Image, ImageDraw
+
+SIDE = 480
+"""Pixels of the longer side."""
+PAPER, INK, STONE, YELLOW, BLUE, RAY = "#f6f6f3", "#3c3c3c", "#787878", "#f0b400", "#145aaa", "#b4c8dc"
+
+
+class Canvas:
+    """Draws robot and rays into a picture of what does not move."""
+
+    def __init__(self, arena: Arena):
+        self._arena, self._scale = arena, SIDE / max(arena.size)
+        self._mounts = [(sonar.position, sonar.angle) for sonar in arena.robot.sonars]
+        width, height = (round(self._scale * side) for side in arena.size)
+        self._still = Image.new("RGB", (width, height), PAPER)
+        draw = ImageDraw.Draw(self._still)
+        draw.rectangle((0, 0, width - 1, height - 1), outline=INK, width=3)
+        for wall in arena.walls:
+            draw.line([self._at(*wall.start), self._at(*wall.end)], STONE, max(round(wall.thickness * self._scale), 1))
+        for polygon in arena.polygons:
+            draw.polygon([self._at(*corner) for corner in polygon.corners], STONE)
+        for disc in arena.discs:
+            draw.circle(self._at(*disc.centre), disc.radius * self._scale, STONE)
+        for light in arena.lights:
+            draw.circle(self._at(*light.position), 0.14 * self._scale, YELLOW)
+
+    def draw(self, pose: tuple[float, float, float], sonar: Sequence[float]) -> np.ndarray:
+        """(height, width, 3) uint8: the robot at a pose with its 16 rays of `sonar` metres."""
+        picture = self._still.copy()
+        draw = ImageDraw.Draw(picture)
+        robot = self._arena.robot
+        for (mount, angle), length in zip(self._mounts, sonar, strict=True):
+            end = mount[0] + length * math.cos(angle), mount[1] + length * math.sin(angle)
+            draw.line([self._on(pose, mount), self._on(pose, end)], RAY)
+        x, y = robot.length / 2, robot.width / 2
+        draw.polygon([self._on(pose, corner) for corner in ((x, y), (-x, y), (-x, -y), (x, -y))], BLUE)
+        for sensor in robot.light_sensors:
+            draw.circle(self._on(pose, sensor), 2, YELLOW)
+        return np.asarray(picture)
+
+    def _on(self, pose: tuple[float, float, float], point: tuple[float, float]) -> tuple[float, float]:
+        """A point of the robot's frame, in pixels."""
+        x, y, heading = pose
+        cos, sin = math.cos(heading), math.sin(heading)
+        return self._at(x + cos * point[0] - sin * point[1], y + sin * point[0] + cos * point[1])
+
+    def _at(self, x: float, y: float) -> tuple[float, float]:
+        return x * self._scale, (self._arena.size[1] - y) * self._scale
+
+
+class Window:
+    """A window on the screen."""
+
+    def __init__(self, fps: int):
+        import pygame
+
+        pygame.display.init()
+        self._pygame, self._fps, self._clock = pygame, fps, pygame.time.Clock()
+        self._surface = None
+
+    def show(self, picture: np.ndarray) -> None:
+        """Show a picture, at the pace of a film."""
+        pygame = self._pygame
+        if self._surface is None:
+            self._surface = pygame.display.set_mode((picture.shape[1], picture.shape[0]))
+            pygame.display.set_caption("Phototaxis")
+        pygame.surfarray.blit_array(self._surface, picture.transpose(1, 0, 2))
+        pygame.event.pump()
+        pygame.display.flip()
+        self._clock.tick(self._fps)
+
+    def close(self) -> None:
+        self._pygame.display.quit()

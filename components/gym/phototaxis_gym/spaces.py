@@ -1,0 +1,110 @@
+"""What an environment's robot sees and does: the spaces, and how they come from readings, for one robot or many."""
+
+import math
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import Error
+from phototaxis.arena import Arena
+from phototaxis.task import ACTIONS, OWN_REWARD, PERCEPTS, REWARDS, Percept, Reward
+
+MOTORS = np.array(ACTIONS)
+"""(9, 2): the motor commands of the discrete actions."""
+
+
+class Observation(Protocol):
+    """One way to see."""
+
+    space: spaces.Space[Any]
+
+    def __call__(self, senses: Any, memory: Any) -> Any:
+        """From readings (of numbers, or of arrays (N,)) to an observation, (N, …) for many."""
+        ...
+
+
+class States:
+    """The number of a percept's state: simple 0..23, rich 0..399, counted with the last variable fastest."""
+
+    def __init__(self, percept: Percept, near: float):
+        self._percept, self._near = percept, near
+        sizes = percept.sizes
+        self._strides = [math.prod(sizes[i + 1 :]) for i in range(len(sizes))]
+        self.space = spaces.Discrete(math.prod(sizes))
+
+    def __call__(self, senses: Any, memory: Any) -> Any:
+        state = self._percept.state(senses, memory, self._near)
+        return sum(variable * stride for variable, stride in zip(state, self._strides, strict=True))
+
+
+class Numbers:
+    """The variables of a percept of real numbers, float32."""
+
+    def __init__(self, percept: Percept, near: float):
+        self._percept, self._near = percept, near
+        self.space = spaces.Box(-1.0, 1.0, (len(percept.sizes),), np.float32)
+
+    def __call__(self, senses: Any, memory: Any) -> Any:
+        return _rows(self._percept.state(senses, memory, self._near))
+
+
+class Sensors:
+    """Everything as it is sensed: 2 lights (0..1), 16 sonars (m), front and rear bumper (0 or 1), float32."""
+
+    def __init__(self, arena: Arena):
+        high = [1.0] * 2 + [arena.robot.sonar_range] * 16 + [1.0] * 2
+        self.space = spaces.Box(np.zeros(20, np.float32), np.array(high, np.float32))
+
+    def __call__(self, senses: Any, memory: Any) -> Any:
+        return _rows((*senses.light, *senses.sonar, senses.front, senses.rear))
+
+
+def _rows(variables: tuple[Any, ...]) -> np.ndarray:
+    """(variables,) of numbers, or (N, variables) of arrays."""
+    many = max((np.shape(one) for one in variables), key=len)
+    return np.stack([np.broadcast_to(one, many) for one in variables], axis=-1).astype(np.float32)
+
+
+def observation(percept: str, arena: Arena) -> Observation:
+    """The observation that `percept` names.
+
+    Raises
+    ------
+    gymnasium.error.Error
+        when there is none; it lists those that exist.
+    """
+    if percept == "sensors":
+        return Sensors(arena)
+    if percept not in PERCEPTS:
+        raise Error(f"no percept '{percept}'; there are: {', '.join([*PERCEPTS, 'sensors'])}")
+    found, near = PERCEPTS[percept], arena.sensing.near
+    return States(found, near) if all(found.sizes) else Numbers(found, near)
+
+
+def rewards(reward: str, percept: str) -> Reward:
+    """The reward scheme; "own" is the percept's, and `potential` for the bare sensors.
+
+    Raises
+    ------
+    gymnasium.error.Error
+        when there is none; it lists those that exist.
+    """
+    name = OWN_REWARD.get(percept, "potential") if reward == "own" else reward
+    if name not in REWARDS:
+        raise Error(f"no reward '{reward}'; there are: {', '.join(['own', *REWARDS])}")
+    return REWARDS[name]
+
+
+def actions(kind: str) -> spaces.Space[Any]:
+    """Discrete: the nine of figure 5. Continuous: left and right wheel in −1..1.
+
+    Raises
+    ------
+    gymnasium.error.Error
+        for another kind.
+    """
+    if kind == "discrete":
+        return spaces.Discrete(len(ACTIONS))
+    if kind == "continuous":
+        return spaces.Box(-1.0, 1.0, (2,), np.float32)
+    raise Error(f"no actions '{kind}'; there are: discrete, continuous")
