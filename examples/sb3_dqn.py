@@ -1,6 +1,6 @@
 """Stable-Baselines3's DQN, as it is, learns to find the light; then it is measured on fresh placements.
 
-    python examples/sb3_dqn.py --steps 5000
+python examples/sb3_dqn.py --steps 5000
 """
 
 import argparse

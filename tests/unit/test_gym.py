@@ -4,6 +4,7 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -43,7 +44,9 @@ def test_the_checkers_find_nothing(percept, action, monkeypatch):
 
 
 def test_it_is_found_without_importing_us():
-    script = f"import gymnasium; print(gymnasium.make({NAME!r}).reset(seed=1)[0], gymnasium.make_vec({NAME!r}, num_envs=3))"
+    script = (
+        f"import gymnasium; print(gymnasium.make({NAME!r}).reset(seed=1)[0], gymnasium.make_vec({NAME!r}, num_envs=3))"
+    )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "num_envs=3" in done.stdout
@@ -51,7 +54,7 @@ def test_it_is_found_without_importing_us():
 
 def test_it_does_what_an_agent_in_one_process_meets():
     """The same placements, readings and rewards as the loop of `phototaxis train`, action by action."""
-    arena, episodes = arenas.load("paper"), 0
+    arena, episodes, reward = arenas.load("paper"), 0, 0.0
     agent = make_setup("qtable").agent(World("x", arena, 5, 0))
     loop = Loop(arena, agent, 5)
     environment = gymnasium.make(NAME, cap=100)
@@ -60,9 +63,9 @@ def test_it_does_what_an_agent_in_one_process_meets():
         ended = loop.step()
         assert int(seen) == agent.last.percept
         if ended is None:
-            seen, reward, *_ = environment.step(agent.last.action)
+            seen, reward, _, _, info = environment.step(agent.last.action)
             state = loop.simulation.state
-            np.testing.assert_array_equal(environment.unwrapped._info()["pose"], (state.x, state.y, state.heading))
+            np.testing.assert_array_equal(info["pose"], (state.x, state.y, state.heading))
         else:
             episodes += 1
             assert reward == agent.last.reward
@@ -191,9 +194,9 @@ def test_pictures(monkeypatch):
     for arena in ("paper", "doorway", "shadows"):
         environment = gymnasium.make(NAME, arena=arena, render_mode="rgb_array")
         environment.reset(seed=1)
-        before = environment.render()
+        before: Any = environment.render()
         environment.step(4)
-        after = environment.render()
+        after: Any = environment.render()
         assert isinstance(before, np.ndarray)
         assert before.shape[2] == 3
         assert before.dtype == np.uint8

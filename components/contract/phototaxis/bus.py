@@ -19,6 +19,8 @@ from zenoh.handlers import Callback
 from phototaxis.messages import ControlReply, Decoder, LogRequest, Message, Refused, encode
 from phototaxis.topics import ROLES, TOPICS, Topic, alive_key
 
+GRACE = 0.5
+"""Seconds after a query's timeout in which Zenoh should have ended it."""
 REQUESTS: dict[str, type[Message]] = {"log": LogRequest}
 
 
@@ -103,15 +105,29 @@ class Bus:
     def ask(
         self, topic: str, request: Message | None = None, timeout: float = 2.0, session: zenoh.Session | None = None
     ) -> Iterator[bytes]:
-        """The replies to a query on a topic as they come; none when nobody answers in time."""
-        replies = (session or self._session).get(
+        """The replies to a query on a topic as they come; none when nobody answers in time.
+
+        It ends `GRACE` after the timeout at the latest, whatever became of those who were asked.
+        """
+        replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
+        (session or self._session).get(
             TOPICS[topic].key(self.name),
+            handler=Callback(replies.put, lambda: replies.put(None), indirect=False),
             payload=None if request is None else encode(request),
             timeout=timeout,
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-        return (reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None)
+        deadline = time.monotonic() + timeout + GRACE
+        while True:
+            try:
+                reply = replies.get(timeout=max(deadline - time.monotonic(), 0.0))
+            except Empty:
+                return
+            if reply is None:
+                return
+            if reply.ok is not None:
+                yield reply.ok.payload.to_bytes()
 
     def ask_agent(self, ident: str, topic: str, request: Message, timeout: float) -> Any:
         """The answer of one agent as a message; None when it is not there, or gives none in time."""

@@ -113,4 +113,8 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         """Where the robot is: for people, not for learners."""
         assert self._simulation is not None  # noqa: S101
         state = self._simulation.state
-        return {"pose": np.array((state.x, state.y, state.heading)), "tick": state.tick, "episode_number": state.episode}
+        return {
+            "pose": np.array((state.x, state.y, state.heading)),
+            "tick": state.tick,
+            "episode_number": state.episode,
+        }

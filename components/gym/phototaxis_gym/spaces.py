@@ -16,7 +16,8 @@ MOTORS = np.array(ACTIONS)
 class Observation(Protocol):
     """One way to see."""
 
-    space: spaces.Space[Any]
+    @property
+    def space(self) -> spaces.Space[Any]: ...
 
     def __call__(self, senses: Any, memory: Any) -> Any:
         """From readings (of numbers, or of arrays (N,)) to an observation, (N, …) for many."""

@@ -94,7 +94,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         seen = self._look()
         senses, memory = self._readings, self._memory
         reward = self._reward.many(np.maximum(*memory.before), senses, memory.unchanged)
-        terminated, truncated = lit(senses), self._steps >= self._cap
+        terminated, truncated = np.asarray(lit(senses)), self._steps >= self._cap
         for column in (reward, terminated, truncated):
             column[fresh] = 0
         self._ended = terminated | truncated

@@ -41,6 +41,7 @@ class Server:
         """The next chunk of each topic and writer."""
         self._writer: dict[str, str] = {}
         """Who wrote the newest chunk of a topic."""
+        self._alive: set[str] = set()
         self._heard: dict[str, float] = {}
         """When the newest chunk of a topic came."""
         self._decoders = {name: Decoder(TOPICS[name].message, TOPICS[name].limit) for name in LOGS}
@@ -62,12 +63,12 @@ class Server:
                 self._translator.flush()
                 flush_at = now + FLUSH_EVERY
             if self._translator is not None and now >= catch_up_at:
-                catch_up_at = now + CATCH_UP_EVERY
                 self._tell(self._translator.summary)
                 behind = self._translator.behind()
                 for topic in LOGS:
                     if topic.removeprefix("log/") in behind or now - self._heard.get(topic, 0.0) > CATCH_UP_EVERY:
                         self._catch_up(topic)
+                catch_up_at = time.monotonic() + CATCH_UP_EVERY  # what has come meanwhile has its turn first
         if self._translator is not None:
             for topic in LOGS:
                 self._catch_up(topic)
@@ -82,6 +83,7 @@ class Server:
 
     def _notice(self, what: str, role: str, ident: str) -> None:
         """Somebody came or went: a simulation may have brought a run; the viewer's log tells of it."""
+        (self._alive.add if what == "alive" else self._alive.discard)(ident)
         if what == "alive" and role == "sim":
             self._meet()
         if self._translator is not None and role in ROLES and role != "observer":
@@ -112,6 +114,8 @@ class Server:
     def _catch_up(self, topic: str) -> None:
         """Ask the newest writer of a topic (anybody, if none is known) for the chunks that are missing."""
         writer = self._writer.get(topic, "")
+        if writer and writer not in self._alive:
+            return
         for payload in self._bus.ask(topic, LogRequest(self._expected.get((topic, writer), 0), writer)):
             try:
                 self._write(topic, self._decoders[topic](payload))
