@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from stable_baselines3 import DQN
 
-NAME = "phototaxis/LightSeeker-v0"
+NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
 
 
 def success(model: DQN, placements: int = 200, seed: int = 1_000_000) -> float:

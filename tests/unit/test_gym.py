@@ -19,7 +19,7 @@ from phototaxis_sim import arenas
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 ROOT = Path(__file__).parents[2]
-NAME = "phototaxis/LightSeeker-v0"
+NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
 PERCEPTS = ("simple", "rich", "continuous", "sensors")
 VARIANTS = [(percept, action) for percept in PERCEPTS for action in ("discrete", "continuous")]
 

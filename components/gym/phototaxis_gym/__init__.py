@@ -1,6 +1,7 @@
 """The task as Gymnasium environments: one robot, or many in one process.
 
-Importing this registers them; `gymnasium.make("phototaxis/LightSeeker-v0")` finds them by their entry point.
+Importing this registers them. Gymnasium does so itself when the name says where from:
+`gymnasium.make("phototaxis_gym:phototaxis/LightSeeker-v0")`.
 """
 
 import gymnasium
@@ -8,11 +9,8 @@ import gymnasium
 CAP = 300
 """Steps after which an episode is truncated."""
 
-
-def register() -> None:
-    """Called by Gymnasium, within the namespace `phototaxis`."""
-    gymnasium.register(
-        "LightSeeker-v0",
-        entry_point="phototaxis_gym.single:LightSeeker",
-        vector_entry_point="phototaxis_gym.vector:LightSeekers",
-    )
+gymnasium.register(
+    "phototaxis/LightSeeker-v0",
+    entry_point="phototaxis_gym.single:LightSeeker",
+    vector_entry_point="phototaxis_gym.vector:LightSeekers",
+)
