@@ -100,7 +100,7 @@ def whole(file: Path, folder: Path) -> Path:
             raise UserError(f"{file}: not a Rerun recording")
     copy = folder / file.name
     with copy.open("wb") as out:
-        done = subprocess.run([*rrd, "merge", "--continue-on-error", file], stdout=out, stderr=subprocess.DEVNULL)
+        done = subprocess.run([*rrd, "optimize", "--continue-on-error", file], stdout=out, stderr=subprocess.DEVNULL)
     if done.returncode:
         raise UserError(f"{file}: nothing of this recording can be read")
     return copy

@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     import rerun as rr
 
     from phototaxis_recorder.server import Server
-    from phototaxis_recorder.sinks import Page, fresh_file, open_recording, probe
+    from phototaxis_recorder.sinks import Page, complete, fresh_file, open_recording, probe
     from phototaxis_recorder.translate import Translator
 
     output = Path(options.output)
@@ -55,6 +55,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     def finish() -> None:
         while recording:
             recording.pop().disconnect()
+            complete(file)
 
     page = Page(options.bind, web_port, grpc_port) if web_port >= 0 else None
     if page is not None:

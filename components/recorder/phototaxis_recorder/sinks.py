@@ -1,5 +1,6 @@
 """Where a recording goes: a file, the live gRPC server, and a page with the web viewer."""
 
+import os
 import socket
 import subprocess
 from pathlib import Path
@@ -10,6 +11,10 @@ from phototaxis.errors import Unavailable
 from phototaxis.messages import World
 
 from phototaxis_recorder.layout import blueprint
+
+LARGE = 250_000_000
+"""Bytes above which a recording is not rewritten at its end: that takes more than twice as much memory."""
+RERUN = Path(rerun_cli.__file__).parent / "rerun"
 
 
 def probe(host: str, port: int, flag: str) -> int:
@@ -30,11 +35,16 @@ def probe(host: str, port: int, flag: str) -> int:
 
 
 def open_recording(world: World, file: Path, host: str, grpc_port: int, memory: str) -> rr.RecordingStream:
-    """A recording that goes to a file and to a live server at the same time."""
+    """A recording that goes to a file and to a live server at the same time.
+
+    The file has no footer while it grows: Rerun would keep the footer's entries in memory, some 20 MB a minute
+    at full speed. `complete` adds it.
+    """
     recording = rr.RecordingStream("phototaxis", recording_id=f"{world.run}-{file.stem}")
     rr.set_log_time_enabled(False, recording=recording)
     server = rr.GrpcServerSink(host, grpc_port, server_memory_limit=memory)
-    recording.set_sinks(server, rr.FileSink(str(file)), default_blueprint=blueprint(world.arena, world.epochs))
+    disk = rr.FileSink(str(file), write_footer=False)
+    recording.set_sinks(server, disk, default_blueprint=blueprint(world.arena, world.epochs))
     recording.send_recording_name(f"{world.arena.name}, {world.run}")
     return recording
 
@@ -48,6 +58,18 @@ def fresh_file(wanted: Path) -> Path:
     return file
 
 
+def complete(file: Path) -> None:
+    """Give a closed recording its footer and larger chunks, so that it opens fast; a large one stays as it is."""
+    if not file.exists() or file.stat().st_size > LARGE:
+        return
+    part = file.with_suffix(".part")
+    command = [RERUN, "rrd", "optimize", file, "-o", part]
+    if subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False).returncode == 0:
+        os.replace(part, file)
+    else:
+        part.unlink(missing_ok=True)
+
+
 class Page:
     """The web viewer's page, served by Rerun's own program on one address.
 
@@ -55,9 +77,8 @@ class Page:
     """
 
     def __init__(self, host: str, port: int, grpc_port: int):
-        program = Path(rerun_cli.__file__).parent / "rerun"
         source = f"rerun+http://localhost:{grpc_port}/proxy"
-        serve = [program, "--serve-web", "--bind", host, "--web-viewer-port", str(port), source]
+        serve = [RERUN, "--serve-web", "--bind", host, "--web-viewer-port", str(port), source]
         self._process = subprocess.Popen(
             ["/bin/sh", "-c", '"$@" & cat >/dev/null; kill $!; wait', "page", *serve],
             stdin=subprocess.PIPE,
