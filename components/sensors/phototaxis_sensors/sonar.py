@@ -5,6 +5,7 @@ import math
 import numpy as np
 from phototaxis.arena import Arena
 
+from phototaxis_sensors.model import BUILT_IN, Moment
 from phototaxis_sensors.scene import Scene
 
 BACK_OFF = 0.1
@@ -13,6 +14,8 @@ BACK_OFF = 0.1
 
 class SonarModel:
     """Ranges in metres, at most the sonar range, without noise."""
+
+    name = BUILT_IN
 
     def __init__(self, arena: Arena, scene: Scene):
         robot = arena.robot
@@ -24,11 +27,11 @@ class SonarModel:
         starts = mounts - BACK_OFF * aim
         self._points = np.concatenate([starts, starts + self._reach * aim])  # (32, 2): starts, then ends
 
-    def __call__(self, x: float, y: float, heading: float) -> list[float]:
-        """The 16 ranges at a pose."""
-        cos, sin = math.cos(heading), math.sin(heading)
+    def __call__(self, moment: Moment) -> list[float]:
+        """The 16 ranges."""
+        cos, sin = math.cos(moment.heading), math.sin(moment.heading)
         turned = self._points @ np.array([[cos, sin], [-sin, cos]])
-        turned += (x, y)
+        turned += (moment.x, moment.y)
         points = turned.tolist()
         hit, reach = self._scene.hit, self._reach
         found = [reach * hit(start, end) - BACK_OFF for start, end in zip(points[:16], points[16:], strict=True)]

@@ -1,28 +1,49 @@
 """The sensor suite: everything the robot senses at one tick."""
 
+from collections.abc import Callable
+from typing import NamedTuple
+
+from phototaxis.arena import Arena
 from phototaxis.messages import Readings, State, World
 
 from phototaxis_sensors.light import LightModel
+from phototaxis_sensors.model import Moment, SensorModel
 from phototaxis_sensors.noise import uniform
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.sonar import SonarModel
 
 
-class SensorSuite:
-    """Readings as a pure function of (world, state): the same state gives the same readings, whenever asked."""
+class Models(NamedTuple):
+    """The models of one robot's sensors."""
 
-    def __init__(self, world: World):
+    sonar: SensorModel
+    light: SensorModel
+
+
+Make = Callable[[Arena, Scene], Models]
+
+
+def built_in(arena: Arena, scene: Scene) -> Models:
+    """The models that come with the suite: pure functions of the pose."""
+    return Models(SonarModel(arena, scene), LightModel(arena, scene))
+
+
+class SensorSuite:
+    """Readings as a function of (world, state): the same state gives the same readings, whenever asked.
+
+    With a model that remembers (an FMU) they depend on the earlier states of the episode, too; each tick
+    is then asked once, in order.
+    """
+
+    def __init__(self, world: World, make: Make = built_in):
         arena = world.arena
-        scene = Scene(arena)
         self._seed, self._noise, self._range = world.seed, arena.sensing.noise, arena.robot.sonar_range
-        self._sonar = SonarModel(arena, scene)
-        self._light = LightModel(arena, scene)
+        self.models = make(arena, Scene(arena))
 
     def __call__(self, state: State) -> Readings:
         """Answer one tick."""
-        pose = state.x, state.y, state.heading
-        sonar = self._sonar(*pose)
-        left, right = self._light(*pose)
+        sonar = list(self.models.sonar(state))
+        left, right = self.models.light(state)
         if self._noise:
             factors = (1 + self._noise * uniform(self._seed, state.tick, 18)).tolist()
             most = self._range
@@ -32,3 +53,8 @@ class SensorSuite:
             state.run, state.tick, state.episode, state.epoch, sonar, (left, right),
             state.front, state.rear, state.left, state.right, state.author, state.driver,
         )  # fmt: skip
+
+    def follow(self, moment: Moment) -> None:
+        """Let models that remember know of a moment that has been answered by another suite."""
+        for model in self.models:
+            model(moment)

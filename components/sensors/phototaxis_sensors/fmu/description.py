@@ -1,0 +1,110 @@
+"""Reads an FMU and says clearly what is wrong with it, before any of its code runs."""
+
+import zipfile
+from pathlib import Path
+from typing import NamedTuple
+
+import fmpy
+from fmpy.model_description import ModelDescription, ModelVariable, ValidationError, read_model_description
+from lxml import etree
+from phototaxis.errors import UserError
+
+LARGEST = 2_000_000_000
+"""Bytes that an FMU may have when unpacked."""
+
+
+class Fmu(NamedTuple):
+    """An FMU that this machine can run, or could after compiling it."""
+
+    file: Path
+    version: int
+    """2 or 3."""
+    description: ModelDescription
+    library: str
+    """Path of its library inside the archive."""
+    platforms: list[str]
+    """Platforms that it has a library for."""
+    sources: bool
+    """Whether it has C sources."""
+    compiled: bool
+    """Whether it has a library for this machine."""
+
+    @property
+    def name(self) -> str:
+        return self.file.name
+
+    def variable(self, name: str) -> ModelVariable | None:
+        """The variable of that name."""
+        return next((one for one in self.description.modelVariables if one.name == name), None)
+
+
+def read(path: str) -> Fmu:
+    """Read an FMU's description without running or unpacking anything.
+
+    Raises
+    ------
+    UserError
+        with one line that says what is wrong.
+    """
+    file = Path(path)
+    try:
+        with zipfile.ZipFile(file) as archive:
+            members = archive.namelist()
+            size = sum(one.file_size for one in archive.infolist())
+            if "modelDescription.xml" not in members:
+                raise UserError(f"{path}: not an FMU: it has no modelDescription.xml")
+            version = _version(path, archive)
+    except FileNotFoundError:
+        raise UserError(f"{path}: there is no such file") from None
+    except (zipfile.BadZipFile, IsADirectoryError):
+        raise UserError(f"{path}: not an FMU: it is not a zip archive") from None
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from None
+    if size > LARGEST:
+        raise UserError(f"{path}: {size / 1e9:.1f} GB when unpacked; at most {LARGEST / 1e9:g} GB are allowed")
+    description = _describe(path)
+    if description.coSimulation is None:
+        raise UserError(f"{path}: made for Model Exchange alone; needed is an FMU for Co-Simulation")
+    if description.coSimulation.needsExecutionTool:
+        raise UserError(f"{path}: runs only with the tool that made it; export it with its own solver")
+    place = fmpy.platform if version == 2 else fmpy.platform_tuple
+    library = f"binaries/{place}/{description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
+    parts = [member.split("/") for member in members]
+    platforms = sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
+    sources = any(part[0] == "sources" and part[-1].endswith((".c", ".cpp")) for part in parts)
+    return Fmu(file, version, description, library, platforms, sources, library in members)
+
+
+def _version(path: str, archive: zipfile.ZipFile) -> int:
+    try:
+        with archive.open("modelDescription.xml") as xml:
+            said = etree.parse(xml, etree.XMLParser(resolve_entities=False)).getroot().get("fmiVersion") or "none"
+    except etree.XMLSyntaxError as error:
+        raise UserError(f"{path}: its modelDescription.xml is not XML: {error.msg}") from None
+    if said != "2.0" and not said.startswith("3."):
+        raise UserError(f"{path}: its FMI version is {said}; needed is 2.0 or 3.0")
+    return int(said[0])
+
+
+def _describe(path: str) -> ModelDescription:
+    try:
+        return read_model_description(path)
+    except ValidationError as error:
+        problem, more = error.problems[0], len(error.problems) - 1
+        raise UserError(
+            f"{path}: its modelDescription.xml is not valid: {problem}{f' (and {more} more)' if more else ''}"
+        ) from None
+    except Exception as error:  # fmpy raises bare ones
+        raise UserError(f"{path}: its modelDescription.xml cannot be used: {error}") from None
+
+
+def require_library(fmu: Fmu, allow_compile: bool) -> None:
+    """Raise UserError unless this machine can run it, after compiling it where that is allowed."""
+    if fmu.compiled or (fmu.sources and allow_compile):
+        return
+    if fmu.sources and not fmu.platforms:
+        raise UserError(f"{fmu.file}: has C sources alone; add --allow-compile to build it here")
+    here = fmu.library.split("/")[1]
+    others = f"only for {', '.join(fmu.platforms)}" if fmu.platforms else "nor any other, nor C sources"
+    compile_it = "; it has C sources: add --allow-compile to build it here" if fmu.sources else ""
+    raise UserError(f"{fmu.file}: has no library {fmu.library} for this machine ({here}), {others}{compile_it}")

@@ -1,0 +1,16 @@
+/* A cheap ultrasonic ranger, 16 of them: nothing is nearer than `blind`, and ranges come in steps. */
+#include <math.h>
+
+#include "model.h"
+
+int model_begin(Model *m) { return model_step(m, 0); }
+
+int model_step(Model *m, double period) {
+    int i;
+    (void)period;
+    for (i = 0; i < 16; i++) {
+        reading[i] = resolution * floor(range[i] / resolution + 0.5);
+        if (reading[i] < blind) reading[i] = blind;
+    }
+    return GOOD;
+}

@@ -1,0 +1,179 @@
+"""The parent of a worker: unpacks an FMU, has its instances stepped in another process, and watches over it."""
+
+import os
+import select
+import signal
+import struct
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import msgspec
+
+from phototaxis_sensors.fmu.build import compile_sources
+from phototaxis_sensors.fmu.description import Fmu
+from phototaxis_sensors.fmu.wiring import Wiring
+from phototaxis_sensors.fmu.worker import BEGIN, HEAD, LENGTH, STEP, Setup
+
+LOADING = 30.0
+"""Seconds that an FMU may take to be loaded."""
+
+
+class Failed(Exception):
+    """The FMU crashed, hung, or said that it cannot go on."""
+
+
+class Host:
+    """Instances of one FMU in a process of their own.
+
+    Parameters
+    ----------
+    fmu, wiring : what is run, and how it is connected.
+    instances : how many; all are stepped together.
+    period : length of a step, s.
+    timeout : seconds after which a silent process is killed.
+    allow_compile : build the library where the FMU has none.
+    """
+
+    def __init__(
+        self, fmu: Fmu, wiring: Wiring, instances: int, period: float, timeout: float, allow_compile: bool = False
+    ):
+        self._fmu, self._wiring, self._period, self._timeout = fmu, wiring, period, timeout
+        self._instances, self._allow_compile = instances, allow_compile
+        self._values_in = sum(_size(wire.variable.shape) for wire in wiring.inputs)
+        self._values_out = wiring.width
+        self._request = struct.Struct(f"<qq{self._values_in * instances}d")
+        self._answer = struct.Struct(f"<qq{self._values_out * instances}d")
+        self._folder: TemporaryDirectory[str] | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._to = self._from = -1
+        self._poll = select.poll()
+
+    def start(self) -> None:
+        """Load the FMU in a fresh process.
+
+        Raises
+        ------
+        Failed
+            when it cannot be loaded.
+        """
+        self.stop()
+        self._folder = TemporaryDirectory(prefix="phototaxis-fmu-")
+        self._unpack(Path(self._folder.name))
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "phototaxis_sensors.fmu.worker"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0, start_new_session=True,
+        )  # fmt: skip
+        assert self._process.stdin is not None  # noqa: S101
+        assert self._process.stdout is not None  # noqa: S101
+        self._to, self._from = self._process.stdin.fileno(), self._process.stdout.fileno()
+        self._poll = select.poll()
+        self._poll.register(self._from, select.POLLIN)
+        setup = msgspec.json.encode(self._setup())
+        self._write(LENGTH.pack(len(setup)) + setup)
+        self._read(HEAD.size, LOADING)
+
+    def begin(self, inputs: Sequence[float]) -> None:
+        """Reset all instances and initialise them with these inputs."""
+        self._write(self._request.pack(BEGIN, 1, *inputs))
+        self._read(self._answer.size, self._timeout)
+
+    def step(self, inputs: Sequence[float], count: int = 1) -> tuple[float, ...]:
+        """Step all instances by `count` periods; their outputs, one instance after the other.
+
+        Raises
+        ------
+        Failed
+            when it does not answer, or says that it failed; the process is then ended.
+        """
+        self._write(self._request.pack(STEP, count, *inputs))
+        return self._answer.unpack(self._read(self._answer.size, self._timeout))[2:]
+
+    def stop(self) -> None:
+        """End the process and remove what was unpacked."""
+        process, self._process = self._process, None
+        if process is not None:
+            for stream in (process.stdin, process.stdout):
+                if stream is not None:
+                    stream.close()
+            try:
+                process.wait(self._timeout)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
+    @property
+    def pid(self) -> int:
+        """Of the process; 0 when there is none."""
+        return 0 if self._process is None else self._process.pid
+
+    def _setup(self) -> Setup:
+        interface, wiring = self._fmu.description.coSimulation, self._wiring
+        assert interface is not None  # noqa: S101
+        assert self._folder is not None  # noqa: S101
+        return Setup(
+            folder=self._folder.name, version=self._fmu.version, identifier=interface.modelIdentifier or "",
+            token=self._fmu.description.guid, instances=self._instances,
+            inputs=[wire.variable.valueReference for wire in wiring.inputs], values_in=self._values_in,
+            outputs=[wire.variable.valueReference for wire in wiring.outputs], values_out=self._values_out,
+            parameters=[tuple(parameter) for parameter in wiring.parameters], period=self._period,
+        )  # fmt: skip
+
+    def _unpack(self, folder: Path) -> None:
+        file = self._fmu.file
+        with TemporaryDirectory(prefix="phototaxis-fmu-") as aside:
+            if not self._fmu.compiled and self._allow_compile:
+                file = Path(aside) / "compiled.fmu"
+                file.write_bytes(self._fmu.file.read_bytes())
+                compile_sources(file)
+            with zipfile.ZipFile(file) as archive:
+                archive.extractall(folder)  # noqa: S202  (zipfile strips what would lead out of the folder)
+
+    def _write(self, data: bytes) -> None:
+        try:
+            while data:
+                data = data[os.write(self._to, data) :]
+        except BrokenPipeError:
+            self._read(HEAD.size, self._timeout)  # its last words, or the way it died
+
+    def _read(self, size: int, timeout: float) -> bytes:
+        answer, deadline = b"", time.monotonic() + timeout
+        while len(answer) < size:
+            if not self._poll.poll(max(deadline - time.monotonic(), 0.0) * 1000):
+                self._kill()
+                raise Failed(f"gave no answer within {timeout:g} s and was ended")
+            got = os.read(self._from, 65536)
+            if not got:
+                raise Failed(self._died())
+            answer += got
+            if len(answer) >= HEAD.size and (bad := HEAD.unpack_from(answer))[0]:
+                size = HEAD.size + bad[1]
+        if HEAD.unpack_from(answer)[0]:
+            self._kill()
+            raise Failed(answer[HEAD.size :].decode(errors="replace"))
+        return answer
+
+    def _kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+        self.stop()
+
+    def _died(self) -> str:
+        process = self._process
+        code = process.wait() if process is not None else 0
+        self.stop()
+        return f"crashed with {signal.Signals(-code).name}" if code < 0 else f"ended its process with code {code}"
+
+
+def _size(shape: tuple[int, ...] | None) -> int:
+    size = 1
+    for extent in shape or ():
+        size *= extent
+    return size

@@ -1,0 +1,148 @@
+"""An FMU as a sensor model: stepped once a tick, begun anew with each episode, restarted when it fails."""
+
+import sys
+import time
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from phototaxis.errors import ComponentFailed
+
+from phototaxis_sensors.fmu.host import Failed, Host
+from phototaxis_sensors.fmu.rigs import Rig
+from phototaxis_sensors.fmu.wiring import Wire, Wiring, bounds
+from phototaxis_sensors.model import BUILT_IN, Moment, SensorModel
+
+RESTARTS, WITHIN = 3, 60.0
+"""An FMU that fails more than so many times within so many seconds keeps failing."""
+REMEMBERED = 100_000
+"""Ticks of an episode that are kept to bring a restarted FMU to the present."""
+
+
+class Step(NamedTuple):
+    """What the FMU was given at one tick."""
+
+    count: int
+    """Periods since the tick before; more than 1 where ticks were missed."""
+    inputs: list[float]
+
+
+class Stepped:
+    """Instances of an FMU that go through an episode together, whatever happens to their process.
+
+    Parameters
+    ----------
+    host : runs them.
+    wiring : how one of them is connected.
+    label : names it in messages, as in "light FMU lag.fmu".
+    """
+
+    def __init__(self, host: Host, wiring: Wiring, label: str):
+        self.label, self._host = label, host
+        self._episode, self._tick = -1, -1
+        self._steps: deque[Step] = deque(maxlen=REMEMBERED)
+        self._failures: deque[float] = deque(maxlen=RESTARTS + 1)
+        self._output = wiring.outputs[0]
+        self._low, self._high = _limits(self._output)
+        self._plain = self._output.factor == 1 and self._output.offset == 0
+        self.anew = -1
+        """Tick at which it had to forget the earlier part of an episode; −1: never."""
+
+    def __call__(self, episode: int, tick: int, inputs: list[float]) -> Sequence[float]:
+        """Outputs of all instances, in our units.
+
+        Raises
+        ------
+        ComponentFailed
+            when it keeps failing.
+        """
+        fresh = episode != self._episode
+        if fresh:
+            self._steps.clear()
+        step = Step(1 if fresh else tick - self._tick, inputs)
+        self._steps.append(step)
+        self._episode, self._tick = episode, tick
+        try:
+            if fresh:
+                self._host.begin(inputs)
+            outputs = self._checked(self._host.step(inputs, step.count))
+        except Failed as why:
+            outputs = self._again(why)
+        if self._plain:
+            return outputs
+        return [(value - self._output.offset) / self._output.factor for value in outputs]
+
+    def _again(self, why: Failed) -> Sequence[float]:
+        """Restart it and lead it through the episode again."""
+        while True:
+            self._failures.append(time.monotonic())
+            line = f"{self.label}: {why} at tick {self._tick}"
+            if len(self._failures) > RESTARTS and self._failures[-1] - self._failures[0] < WITHIN:
+                self._host.stop()
+                raise ComponentFailed(f"{line}, after {RESTARTS} restarts")
+            print(f"sensors: {line}; restarted", file=sys.stderr, flush=True)
+            if len(self._steps) == REMEMBERED:
+                self.anew = self._tick
+            try:
+                self._host.start()
+                self._host.begin(self._steps[0].inputs)
+                outputs: Sequence[float] = ()
+                for step in self._steps:
+                    outputs = self._host.step(step.inputs, step.count)
+                return self._checked(outputs)
+            except Failed as error:
+                why = error
+
+    def _checked(self, outputs: Sequence[float]) -> Sequence[float]:
+        for value in outputs:
+            if not self._low <= value <= self._high:  # neither is NaN
+                self._host.stop()
+                raise Failed(
+                    f"its {self._output.variable.name} is {value:g}, not in {self._low:g} to {self._high:g}"
+                )
+        return outputs
+
+
+def _limits(wire: Wire) -> tuple[float, float]:
+    """What an output may be, in its own unit: as declared, finite, and not below our 0."""
+    low, high = bounds(wire.variable)
+    largest = sys.float_info.max
+    return max(low, wire.offset - 1e-9 * wire.factor), min(high, largest)
+
+
+class FmuModel:
+    """A sensor model that is an FMU.
+
+    Parameters
+    ----------
+    stepped : its instances.
+    rig : what the instances are given, and what becomes of their outputs.
+    fallback : takes its place when it keeps failing; None: that is an error.
+    """
+
+    def __init__(self, stepped: Stepped, rig: Rig, fallback: SensorModel | None, name: str):
+        self._stepped, self._rig, self._fallback, self._name = stepped, rig, fallback, name
+        self._failed = False
+
+    @property
+    def name(self) -> str:
+        if self._failed:
+            return f"{BUILT_IN}, as {self._name} failed"
+        anew = self._stepped.anew
+        return self._name if anew < 0 else f"{self._name}, its state begun anew at tick {anew}"
+
+    def begun_anew(self, tick: int) -> None:
+        """Say that what was before this tick of the episode is not known to it."""
+        self._stepped.anew = tick
+
+    def __call__(self, moment: Moment) -> Sequence[float]:
+        if self._failed and self._fallback is not None:
+            return self._fallback(moment)
+        try:
+            return self._rig.collect(self._stepped(moment.episode, moment.tick, self._rig.feed(moment)))
+        except ComponentFailed as error:
+            if self._fallback is None:
+                raise
+            print(f"sensors: {error}; the built-in model takes its place", file=sys.stderr, flush=True)
+            self._failed = True
+            return self._fallback(moment)
