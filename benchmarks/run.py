@@ -215,11 +215,10 @@ def parts(arena: Arena) -> dict[str, float]:
     physics, scene = Physics(arena), Scene(arena)
     physics.place(Pose(3, 3, 0))
     sonar, light = SonarModel(arena, scene), LightModel(arena, scene)
-    pose = state.x, state.y, state.heading
     costs = {
         "physics: 5 steps": cost(lambda: physics.drive(0.5, -0.5)),
-        "16 sonars": cost(lambda: sonar(*pose)),
-        "2 light sensors": cost(lambda: light(*pose)),
+        "16 sonars": cost(lambda: sonar(state)),
+        "2 light sensors": cost(lambda: light(state)),
         "sensor suite (sonar, light, noise, message)": cost(lambda: loop.sensors(state)),
         "the same while three processes take turns on pipes": taking_turns(),
         "agent (percept, reward, learning, action, message)": cost(lambda: agent_step(loop, readings)),
@@ -274,7 +273,7 @@ def recorder_cost(arena: Arena, loop: Loop) -> float:
             tick, ones = list(range(first, first + chunk)), [1.0] * chunk
             zeros = [0] * chunk
             translator.sim(SimLog("b", 0, "w", "d", tick, zeros, ones, ones, ones, ones, ones, ones, zeros, []))
-            translator.sensors(SensorsLog("b", 0, "w", tick, [1.0] * 16 * chunk, [0.1] * 2 * chunk))
+            translator.sensors(SensorsLog("b", 0, "w", "", "", tick, [1.0] * 16 * chunk, [0.1] * 2 * chunk))
             translator.agent(AgentLog("b", 0, "w", "qtable", "simple", tick, zeros, zeros, ones, ones, ones))
             if first % 400 == 0:
                 translator.flush()

@@ -13,6 +13,7 @@ from phototaxis_recorder import policy
 from phototaxis_recorder.colors import of_distance, of_reward
 from phototaxis_recorder.field import CELLS, light_field
 from phototaxis_sensors.light import LightModel
+from phototaxis_sensors.model import Past
 from phototaxis_sensors.scene import Scene
 
 
@@ -28,7 +29,7 @@ def test_the_field_is_what_an_eye_there_reads():
     cell = 6.0 / CELLS
     for row, column in ((5, 5), (60, 10), (60, 40), (90, 100), (60, 60)):
         x, y = (column + 0.5) * cell, (row + 0.5) * cell
-        assert field[row, column] == pytest.approx(eye(x, y, 0.0)[0], abs=1e-9)
+        assert field[row, column] == pytest.approx(eye(Past(0, 0, x, y, 0.0))[0], abs=1e-9)
     assert field[60, 10] == 0.0, "behind the wall"
 
 

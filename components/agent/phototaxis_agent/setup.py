@@ -95,8 +95,12 @@ def from_checkpoint(meta: Meta, source: str) -> Setup:
         raise UserError(f"{source}: {error}") from None
 
 
-def parse_setup(struct: type[Any], argv: Sequence[str] | None, prog: str, about: str) -> tuple[Any, Setup]:
+def parse_setup(
+    struct: type[Any], argv: Sequence[str] | None, prog: str, about: str, **more: type[Any]
+) -> tuple[Any, ...]:
     """Read a command's own options together with the agent's; the learner's own are known by its name.
+
+    `more` are further groups of options by their title. The result: own options, setup, further ones.
 
     Raises
     ------
@@ -111,8 +115,9 @@ def parse_setup(struct: type[Any], argv: Sequence[str] | None, prog: str, about:
         "task": TaskOptions,
         "exploration": Exploration,
         f"hyperparameters of {name}": find(name).Options,
+        **more,
     }
     defaults = presets(name, peek(words, "--percept", TaskOptions().percept))
     parsed = parse_groups(groups, words, prog, about, defaults=defaults)
-    own, chosen, task, exploration, hyperparameters = parsed
-    return own, Setup(chosen.learner, hyperparameters, task, exploration)
+    own, chosen, task, exploration, hyperparameters, *others = parsed
+    return own, Setup(chosen.learner, hyperparameters, task, exploration), *others

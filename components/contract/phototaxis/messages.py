@@ -266,6 +266,9 @@ class SensorsLog(Message):
     run: Name
     seq: Count
     writer: Name
+    sonar_model: str
+    """Which model the ranges come from: "built-in", or the file of an FMU."""
+    light_model: str
     tick: list[int]
     sonar: Column
     light: Column

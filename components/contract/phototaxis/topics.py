@@ -88,7 +88,7 @@ class Role(NamedTuple):
 
 ROLES = {
     "sim": Role(reads=("command",), dials=()),
-    "sensors": Role(reads=("state",), dials=("sim",), asks=("world",)),
+    "sensors": Role(reads=("state",), dials=("sim",), asks=("world", "log/sim")),
     "recorder": Role(reads=("log/sim", "log/sensors", "log/agent"), dials=("sim", "sensors"), asks=("world",)),
     "agent": Role(reads=("readings",), dials=("sim", "sensors", "recorder"), asks=("world", "control", "checkpoint")),
     "launcher": Role(reads=("status",), dials=("sim",), asks=("control",)),

@@ -8,8 +8,9 @@ import msgspec
 from msgspec import Meta, Struct
 from phototaxis.checkpoint import load
 from phototaxis.errors import UserError
+from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
-from phototaxis.options import parse
+from phototaxis.options import parse_groups
 
 
 class Options(Struct, kw_only=True):
@@ -31,8 +32,10 @@ class Options(Struct, kw_only=True):
 
 def main(argv: Sequence[str]) -> int:
     about = "Freeze the policy of a checkpoint and measure it on fresh random placements."
-    options = parse(Options, argv, "phototaxis evaluate", about, positional=["checkpoint"])
+    groups = {"": Options, "sensor models": FmuOptions}
+    options, fmus = parse_groups(groups, argv, "phototaxis evaluate", about, positional=["checkpoint"])
     from phototaxis_agent.setup import from_checkpoint
+    from phototaxis_sensors.choice import choose
     from phototaxis_sim import arenas
 
     from phototaxis_lab.measure import SEED_OFFSET, describe, evaluate
@@ -45,6 +48,7 @@ def main(argv: Sequence[str]) -> int:
     setup = from_checkpoint(meta, str(path))
     agent = setup.agent(World("evaluation", arena, options.seed + SEED_OFFSET, 0), learning=False)
     agent.take_over(meta, arrays, str(path))
-    found = evaluate(arena, agent, options.placements, options.seed, options.cap)
+    with choose(fmus) as sensors:
+        found = evaluate(arena, agent, options.placements, options.seed, options.cap, sensors)
     print(msgspec.json.encode(found).decode() if options.json else describe(found))
     return 0

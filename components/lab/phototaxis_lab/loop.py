@@ -6,16 +6,16 @@ from phototaxis.arena import Arena
 from phototaxis.messages import Episode, World
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.setup import Setup
-from phototaxis_sensors.suite import SensorSuite
+from phototaxis_sensors.suite import Make, SensorSuite, built_in
 from phototaxis_sim.simulation import Simulation
 
 
 class Loop:
     """One run, tick by tick, bit-identical to the same run over the bus."""
 
-    def __init__(self, arena: Arena, agent: Agent, seed: int, epochs: int = 0, run: str = "lab"):
+    def __init__(self, arena: Arena, agent: Agent, seed: int, epochs: int = 0, run: str = "lab", make: Make = built_in):
         self.simulation = Simulation(arena, seed, run, epochs)
-        self.sensors = SensorSuite(self.simulation.world)
+        self.sensors = SensorSuite(self.simulation.world, make)
         self.agent = agent
 
     def step(self) -> Episode | None:
@@ -29,9 +29,9 @@ class Loop:
         self.agent(self.sensors(self.simulation.state))
 
 
-def train(setup: Setup, arena: Arena, seed: int, epochs: int) -> tuple[Loop, float]:
+def train(setup: Setup, arena: Arena, seed: int, epochs: int, make: Make = built_in) -> tuple[Loop, float]:
     """Learn for `epochs` steps; the loop as it ended, and the seconds it took."""
-    loop = Loop(arena, setup.agent(World("lab", arena, seed, epochs)), seed, epochs)
+    loop = Loop(arena, setup.agent(World("lab", arena, seed, epochs)), seed, epochs, make=make)
     began = time.perf_counter()
     while not loop.simulation.finished:
         loop.step()

@@ -10,7 +10,7 @@ from phototaxis.messages import World
 from phototaxis.task import REACHED, CrowdReadings, lit
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.crowd import CrowdAgent
-from phototaxis_sensors.crowd import CrowdSuite
+from phototaxis_sensors.choice import BuiltInChoice, Choice
 from phototaxis_sim.crowd import Crowd
 from phototaxis_sim.physics import Physics, Pose
 
@@ -57,23 +57,30 @@ def direct_steps(arena: Arena, start: Pose) -> float:
     return max(fewest, 1.0)
 
 
-def evaluate(arena: Arena, agent: Agent, placements: int, seed: int, cap: int = CAP) -> Evaluation:
+BUILT_IN = BuiltInChoice()
+
+
+def evaluate(
+    arena: Arena, agent: Agent, placements: int, seed: int, cap: int = CAP, sensors: Choice = BUILT_IN
+) -> Evaluation:
     """Place `placements` robots at random, one at a place, and let the frozen agent drive each for `cap` steps."""
     if agent.learning:
         raise ValueError("an agent that is evaluated must not learn")
-    return measure(arena, CrowdAgent(agent, arena.sensing.near, placements, seed), placements, seed, cap)
+    return measure(arena, CrowdAgent(agent, arena.sensing.near, placements, seed), placements, seed, cap, sensors)
 
 
 Policy = Callable[[CrowdReadings], np.ndarray]
 """From what N robots sense to their motor commands, (N, 2)."""
 
 
-def measure(arena: Arena, policy: Policy, placements: int, seed: int, cap: int = CAP) -> Evaluation:
+def measure(
+    arena: Arena, policy: Policy, placements: int, seed: int, cap: int = CAP, sensors: Choice = BUILT_IN
+) -> Evaluation:
     """The same for any policy."""
     seed += SEED_OFFSET
     physics = Physics(arena)
     starts = [physics.random_pose(np.random.default_rng((seed, number))) for number in range(placements)]
-    crowd, suite = Crowd(arena, starts), CrowdSuite(World("evaluation", arena, seed, 0))
+    crowd, suite = Crowd(arena, starts), sensors.crowd(World("evaluation", arena, seed, 0), placements)
     steps = np.full(placements, -1)
     for step in range(cap + 1):
         readings = CrowdReadings(*suite(step, crowd.poses), crowd.front, crowd.rear)

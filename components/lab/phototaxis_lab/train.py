@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from msgspec import Meta
 from phototaxis.checkpoint import save
 from phototaxis.errors import UserError
+from phototaxis.fmu import FmuOptions
 
 from phototaxis_lab.experiment import Running, seed_range
 
@@ -33,25 +34,32 @@ def main(argv: Sequence[str]) -> int:
     from phototaxis_agent.setup import parse_setup
 
     about = "Learn in one process, without a bus; the same seeds give the same hashes as `phototaxis up`."
-    options, setup = parse_setup(Options, argv, "phototaxis train", about)
+    options, setup, fmus = parse_setup(Options, argv, "phototaxis train", about, **{"sensor models": FmuOptions})
     if options.checkpoint and options.seeds:
         raise UserError("--checkpoint keeps one learner, --seeds makes many; give one of the two")
     if options.checkpoint and not Path(options.checkpoint).parent.is_dir():
         raise UserError(f"--checkpoint {options.checkpoint}: there is no folder {Path(options.checkpoint).parent}")
+    if options.seeds and fmus != FmuOptions():
+        raise UserError("--seeds makes many learners at once, with the built-in sensors; leave the FMU out")
+    from phototaxis_sensors.choice import choose
     from phototaxis_sim import arenas
 
     arena = arenas.load(options.arena)
-    found = many(options, setup, arena) if options.seeds else one(options, setup, arena)
+    if options.seeds:
+        found = many(options, setup)
+    else:
+        with choose(fmus) as make:
+            found = one(options, setup, arena, make)
     if options.json:
         print(json.dumps(found))
     return 0
 
 
-def one(options: Options, setup: Any, arena: Any) -> dict[str, Any]:
+def one(options: Options, setup: Any, arena: Any, make: Any) -> dict[str, Any]:
     """One seed: hashes, rate and, if wanted, the checkpoint."""
     from phototaxis_lab.loop import train
 
-    loop, seconds = train(setup, arena, options.seed, options.epochs)
+    loop, seconds = train(setup, arena, options.seed, options.epochs, make)
     meta, arrays = loop.agent.checkpoint()
     if options.checkpoint:
         save(Path(options.checkpoint), meta, arrays)
@@ -77,7 +85,7 @@ def one(options: Options, setup: Any, arena: Any) -> dict[str, Any]:
     return found
 
 
-def many(options: Options, setup: Any, arena: Any) -> dict[str, Any]:
+def many(options: Options, setup: Any) -> dict[str, Any]:
     """Many seeds: the success of each, and what they come to."""
     from phototaxis_lab.cell import Cell, System
     from phototaxis_lab.grid import summary, watched

@@ -7,21 +7,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from phototaxis.errors import ComponentFailed
+from phototaxis.options import flags
 
 from phototaxis_launcher import up
 from phototaxis_launcher.progress import Progress
 
 
 def main(argv: Sequence[str]) -> int:
-    options, words = up.parse(argv, "phototaxis demo")
-    run = up.Run(options, words)
+    options, fmus, words = up.parse(argv, "phototaxis demo")
+    run = up.Run(options, fmus, words)
     status = run.go(Progress(options.epochs))
     result = run.result(status)
     if not result["finished"]:
         print("stopped before the end; nothing is evaluated", file=sys.stderr)
         return 0
     placements = 200
-    evaluate = [sys.executable, "-m", "phototaxis_launcher", "evaluate", str(run.checkpoint), "--json"]
+    evaluate = [sys.executable, "-m", "phototaxis_launcher", "evaluate", str(run.checkpoint), "--json", *flags(fmus)]
     done = subprocess.run([*evaluate, f"--placements={placements}"], capture_output=True, text=True, check=False)
     if done.returncode:
         raise ComponentFailed(f"the evaluation failed: {done.stderr.strip()}")

@@ -14,6 +14,7 @@ from msgspec import Meta
 from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
 from phototaxis.errors import ComponentFailed, UserError
+from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Launch, LaunchReply, Status, run_name
 from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.session import BusOptions, open_session
@@ -59,7 +60,7 @@ class UpOptions(BusOptions, kw_only=True):
 class Run:
     """One run of the system."""
 
-    def __init__(self, options: UpOptions, agent_words: list[str]):
+    def __init__(self, options: UpOptions, fmus: FmuOptions, agent_words: list[str]):
         self._options, self._words = options, agent_words
         swaps = swap_plan(options.swap)
         self.name = run_name()
@@ -82,7 +83,7 @@ class Run:
                 "sim", *bus, *common, f"--epochs={options.epochs}", f"--speed={options.speed}",
                 f"--journal={self.folder / 'sim.journal'}",
             ),
-            "sensors": self._child("sensors", *bus),
+            "sensors": self._child("sensors", *bus, *flags(fmus)),
             "agent": self._agent(agent_words),
         }  # fmt: skip
         for tick, learner in swaps:
@@ -274,24 +275,25 @@ def _learner(words: Sequence[str]) -> str:
     return peek(words, "--learner", "qtable")
 
 
-def parse(argv: Sequence[str], prog: str = "phototaxis up") -> tuple[UpOptions, list[str]]:
-    """Our own options, and the words for the agent."""
+def parse(argv: Sequence[str], prog: str = "phototaxis up") -> tuple[UpOptions, FmuOptions, list[str]]:
+    """Our own options, those of the sensors, and the words for the agent."""
     parser = Parser(
         prog=prog,
         description="Start simulation, sensors, agent and recorder, and watch over them.",
         epilog="Options of `phototaxis agent` (see its --help) are passed on to the agent.",
     )
     add_options(parser, UpOptions)
+    add_options(parser.add_argument_group("sensor models"), FmuOptions)
     own, words = parser.parse_known_args(argv)
     options = convert(UpOptions, vars(own))
     if options.listen:
         raise UserError(f"--listen is for single components; {prog} links its own, or uses a router with --connect")
-    return options, words
+    return options, convert(FmuOptions, vars(own)), words
 
 
 def main(argv: Sequence[str]) -> int:
-    options, words = parse(argv)
-    run = Run(options, words)
+    options, fmus, words = parse(argv)
+    run = Run(options, fmus, words)
     status = run.go(Progress(options.epochs))
     result = run.result(status)
     if options.json:

@@ -41,6 +41,7 @@ class Translator:
         self._episode = -1
         self._recent: deque[bool] = deque(maxlen=50)
         self._driver = self._framed = ""
+        self._models = {"sonar": "", "light": ""}
         self._rewards: deque[float] = deque(maxlen=MEAN)
         self.summary = Summary(world.run, world.arena.name)
         draw_world(recording, world.arena)
@@ -60,7 +61,14 @@ class Translator:
             self._episode = self._episodes[-1].episode
 
     def sensors(self, chunk: SensorsLog) -> None:
-        """Sonar and light."""
+        """Sonar and light, and which models they come from."""
+        for kind, model in (("sonar", chunk.sonar_model), ("light", chunk.light_model)):
+            if model != self._models[kind]:
+                if self._models[kind] or model != "built-in":
+                    self._text(chunk.tick[0], f"{kind} readings come from: {model}")
+                self._models[kind] = model
+                self._at(chunk.tick[0])
+                rr.log(f"world/robot/{kind}_model", rr.TextDocument(model), recording=self._recording)
         sonar, light = np.reshape(chunk.sonar, (-1, 16)), np.reshape(chunk.light, (-1, 2))
         self._add("sensors", chunk.tick, sonar, light)
 

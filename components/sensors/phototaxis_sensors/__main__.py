@@ -3,14 +3,18 @@
 from collections.abc import Sequence
 
 from phototaxis.component import ComponentOptions, entry, run
-from phototaxis.options import parse
+from phototaxis.fmu import FmuOptions
+from phototaxis.options import parse_groups
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    options = parse(ComponentOptions, argv, "phototaxis sensors", "Run the robot's sonars, lights and bumpers.")
+    groups = {"": ComponentOptions, "sensor models": FmuOptions}
+    options, models = parse_groups(groups, argv, "phototaxis sensors", "Run the robot's sonars, lights and bumpers.")
+    from phototaxis_sensors.choice import choose
     from phototaxis_sensors.server import Server
 
-    run("sensors", options, lambda bus: Server(bus).serve())
+    with choose(models) as make:
+        run("sensors", options, lambda bus: Server(bus, make).serve())
 
 
 if __name__ == "__main__":

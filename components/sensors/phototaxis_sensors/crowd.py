@@ -43,30 +43,35 @@ class CrowdSuite:
         return np.maximum(reach * self._walls.hit(start, ray) - BACK_OFF, 0.0)
 
     def _light(self, poses: np.ndarray) -> np.ndarray:
+        law = self._arena.sensing
+        total = np.zeros((2, len(poses)))
+        for light in self._arena.lights:
+            _, _, distance, visible = self.sight(light, poses)
+            if law.light_law == "linear":
+                value = np.maximum(1 - distance / law.light_range, 0.0)
+            else:
+                value = 1 / np.maximum(distance, 1.0) ** 2
+            total += np.where(visible, light.brightness * value, 0.0)
+        return np.minimum(total, 1.0)
+
+    def sight(self, light: Light, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """One light as each robot's two sensors see it, (2, N) each.
+
+        Its place relative to the sensor (east and north, m), its distance, and whether neither a wall nor the
+        robot's own body is in between.
+        """
         x, y, heading = poses.T
         cos, sin = np.cos(heading), np.sin(heading)
         mounts = np.array(self._arena.robot.light_sensors).T[:, :, None]
         eye = x + cos * mounts[0] - sin * mounts[1], y + sin * mounts[0] + cos * mounts[1]
-        total = np.zeros((2, len(poses)))
-        for light in self._arena.lights:
-            total += self._one(light, poses, eye)
-        return np.minimum(total, 1.0)
-
-    def _one(self, light: Light, poses: np.ndarray, eye: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """What one light gives to the two sensors of each robot."""
-        law = self._arena.sensing
         to_light = light.position[0] - eye[0], light.position[1] - eye[1]
         distance = np.hypot(*to_light)
-        if law.light_law == "linear":
-            value = np.maximum(1 - distance / law.light_range, 0.0)
-        else:
-            value = 1 / np.maximum(distance, 1.0) ** 2
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(distance > SHORT, 1 - SHORT / distance, 0.0)
         dark = self._walls.hit(eye, (share * to_light[0], share * to_light[1])) < 1
-        if law.body_shadow:
+        if self._arena.sensing.body_shadow:
             dark |= self._through_body(light, poses)
-        return np.where(dark, 0.0, light.brightness * value)
+        return *to_light, distance, ~dark
 
     def _through_body(self, light: Light, poses: np.ndarray) -> np.ndarray:
         """Whether the line from light to sensor crosses the inside of the body's rectangle (slab method)."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from phototaxis.arena import Arena, Light
 
-from phototaxis_sensors.model import BUILT_IN, Moment
+from phototaxis_sensors.model import BuiltIn, Moment
 from phototaxis_sensors.scene import Scene
 
 SHORT = 0.1
@@ -77,10 +77,8 @@ class Sights:
         return leave - enter > 1e-9
 
 
-class LightModel:
+class LightModel(BuiltIn):
     """Readings in 0..1, without noise: the visible lights are summed and clipped."""
-
-    name = BUILT_IN
 
     def __init__(self, arena: Arena, scene: Scene):
         self._sights, self._sensing = Sights(arena, scene), arena.sensing

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-BUILT_IN = "built-in"
-
 
 class Moment(Protocol):
     """Where the robot is at one tick: a `State`, or the part of it that sensor models read."""
@@ -31,13 +29,31 @@ class Past(NamedTuple):
     heading: float
 
 
+class BuiltIn:
+    """What the built-in models have in common: they are pure functions of the pose."""
+
+    name = "built-in"
+    remembers = False
+
+    def begun_anew(self, tick: int) -> None:
+        """Nothing is lost."""
+
+
 class SensorModel(Protocol):
-    """One kind of sensor. It may remember earlier ticks of the episode; each tick is asked once, in order."""
+    """One kind of sensor."""
 
     @property
     def name(self) -> str:
         """For the recording."""
         ...
+
+    @property
+    def remembers(self) -> bool:
+        """Whether earlier ticks of the episode matter; then each tick is to be asked once, in order."""
+        ...
+
+    def begun_anew(self, tick: int) -> None:
+        """What was before this tick of an episode is not to be had."""
 
     def __call__(self, moment: Moment) -> Sequence[float]:
         """The readings: 16 ranges in m, or two lights in 0..1."""

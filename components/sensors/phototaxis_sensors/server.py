@@ -6,24 +6,31 @@ from typing import Any, NamedTuple
 
 from phototaxis.bus import Bus
 from phototaxis.chunks import Chunks
-from phototaxis.messages import Readings, SensorsLog, State
+from phototaxis.messages import Decoder, LogRequest, Readings, Refused, SensorsLog, SimLog, State
 from phototaxis.protocol import Once
+from phototaxis.topics import TOPICS
 
-from phototaxis_sensors.suite import SensorSuite
+from phototaxis_sensors.model import BuiltIn, Past
+from phototaxis_sensors.suite import Make, SensorSuite, built_in
 
 
 class Session(NamedTuple):
     """The sensors in one run."""
 
     run: str
+    suite: SensorSuite
     sense: Once[Readings]
 
 
 class Server:
-    """Readings for every state of whatever run is on the bus."""
+    """Readings for every state of whatever run is on the bus.
 
-    def __init__(self, bus: Bus):
-        self._bus = bus
+    Models that remember (FMUs) are first led through what the simulation's log tells of the episode.
+    """
+
+    def __init__(self, bus: Bus, make: Make = built_in):
+        self._bus, self._make = bus, make
+        self._models = (BuiltIn.name, BuiltIn.name)
         self._session: Session | None = None
         self._newest = -1
         self._log = Chunks(bus, "log/sensors", self._chunk)
@@ -43,29 +50,57 @@ class Server:
                 return
 
     def _answer(self, state: State) -> None:
-        session = self._meet(state.run)
-        readings = session.sense(state) if session else None
+        session = self._meet(state)
+        if session is None:
+            return
+        readings = session.sense(state)
         if readings is None:
             return
         readings.driver = state.driver  # the seat may change while a tick is asked again
         self._bus.put("readings", readings)
         if state.tick > self._newest:
             self._newest = state.tick
+            models = session.suite.models.sonar.name, session.suite.models.light.name
+            if models != self._models:  # a chunk has one set of models
+                self._log.flush()
+                self._models = models
             self._log.add((state.run, state.tick, readings.sonar, readings.light), time.monotonic())
 
-    def _meet(self, run: str) -> Session | None:
+    def _meet(self, state: State) -> Session | None:
         """The sensors of a run; None when its world is not to be had now (the state will come again)."""
-        if self._session is not None and self._session.run == run:
+        if self._session is not None and self._session.run == state.run:
             return self._session
         world = self._bus.ask_one("world")
-        if world is None or world.run != run:
+        if world is None or world.run != state.run:
             return None
         self._log.flush()
         self._newest = -1
-        self._session = Session(run, Once(SensorSuite(world)))
+        suite = SensorSuite(world, self._make)
+        if any(model.remembers for model in suite.models):
+            self._recall(suite, state)
+        self._session = Session(state.run, suite, Once(suite))
         return self._session
+
+    def _recall(self, suite: SensorSuite, now: State) -> None:
+        """Lead the models through the earlier ticks of the episode, which the simulation's log has."""
+        decode, past = Decoder(SimLog, TOPICS["log/sim"].limit), dict[int, Past]()
+        for payload in self._bus.ask("log/sim", LogRequest()):
+            try:
+                chunk = decode(payload)
+            except Refused as why:
+                self._bus.refuse("log/sim", str(why))
+                continue
+            columns = zip(chunk.tick, chunk.episode, chunk.x, chunk.y, chunk.heading, strict=True)
+            past.update({row[0]: Past(*row) for row in columns if chunk.run == now.run and row[0] < now.tick})
+        episode = [past[tick] for tick in sorted(past) if past[tick].episode == now.episode]
+        for moment in episode:
+            suite.follow(moment)
+        began = episode[0].tick if episode else now.tick
+        if began and (began - 1 not in past or past[began - 1].episode == now.episode):
+            for model in suite.models:
+                model.begun_anew(began)
 
     def _chunk(self, seq: int, columns: list[Any]) -> SensorsLog:
         runs, ticks, sonars, lights = columns
         sonar, light = list(chain.from_iterable(sonars)), list(chain.from_iterable(lights))
-        return SensorsLog(runs[0], seq, self._bus.ident, ticks, sonar, light)
+        return SensorsLog(runs[0], seq, self._bus.ident, self._models[0], self._models[1], ticks, sonar, light)

@@ -5,17 +5,15 @@ import math
 import numpy as np
 from phototaxis.arena import Arena
 
-from phototaxis_sensors.model import BUILT_IN, Moment
+from phototaxis_sensors.model import BuiltIn, Moment
 from phototaxis_sensors.scene import Scene
 
 BACK_OFF = 0.1
 """A ray starts this far inside the body, m, so that a rim pressed into a wall reads 0 and not what is behind it."""
 
 
-class SonarModel:
+class SonarModel(BuiltIn):
     """Ranges in metres, at most the sonar range, without noise."""
-
-    name = BUILT_IN
 
     def __init__(self, arena: Arena, scene: Scene):
         robot = arena.robot

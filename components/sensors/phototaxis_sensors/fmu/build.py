@@ -85,14 +85,14 @@ def _references(example: Example) -> Iterator[tuple[Variable, int]]:
 
 
 def _description(example: Example, version: str, **more: str) -> ET.Element:
-    return ET.Element(
-        "fmiModelDescription", fmiVersion=version, modelName=example.name, description=example.about,
-        generationTool="phototaxis", variableNamingConvention="structured", **more,
-    )  # fmt: skip
+    given = {"fmiVersion": version, "modelName": example.name, "description": example.about}
+    more |= {"generationTool": "phototaxis", "variableNamingConvention": "structured"}
+    return ET.Element("fmiModelDescription", given | more)
 
 
-def _abilities(state: str) -> dict[str, str]:
-    return {"canHandleVariableCommunicationStepSize": "true", f"canGetAndSet{state}": "true"}
+def _interface(example: Example, state: str) -> dict[str, str]:
+    abilities = {"canHandleVariableCommunicationStepSize": "true", f"canGetAndSet{state}": "true"}
+    return {"modelIdentifier": example.name} | abilities
 
 
 def _units(root: ET.Element) -> None:
@@ -110,7 +110,7 @@ def _attributes(variable: Variable) -> dict[str, str]:
 def _fmi2(example: Example, token: str) -> ET.Element:
     """An array becomes scalars NAME[1], NAME[2], …."""
     root = _description(example, "2.0", guid=token)
-    interface = ET.SubElement(root, "CoSimulation", modelIdentifier=example.name, **_abilities("FMUstate"))
+    interface = ET.SubElement(root, "CoSimulation", _interface(example, "FMUstate"))
     files = ET.SubElement(interface, "SourceFiles")
     for name in (f"{example.name}.c", "fmi2.c"):
         ET.SubElement(files, "File", name=name)
@@ -136,7 +136,7 @@ def _fmi2(example: Example, token: str) -> ET.Element:
 
 def _fmi3(example: Example, token: str) -> ET.Element:
     root = _description(example, "3.0", instantiationToken=token)
-    ET.SubElement(root, "CoSimulation", modelIdentifier=example.name, **_abilities("FMUState"))
+    ET.SubElement(root, "CoSimulation", _interface(example, "FMUState"))
     _units(root)
     variables, structure = ET.SubElement(root, "ModelVariables"), ET.SubElement(root, "ModelStructure")
     ET.SubElement(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable, ValidationError, read_model_description
-from lxml import etree
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from phototaxis.errors import UserError
 
 LARGEST = 2_000_000_000

@@ -16,7 +16,7 @@ import msgspec
 
 from phototaxis_sensors.fmu.build import compile_sources
 from phototaxis_sensors.fmu.description import Fmu
-from phototaxis_sensors.fmu.wiring import Wiring
+from phototaxis_sensors.fmu.wiring import Wiring, size
 from phototaxis_sensors.fmu.worker import BEGIN, HEAD, LENGTH, STEP, Setup
 
 LOADING = 30.0
@@ -44,7 +44,7 @@ class Host:
     ):
         self._fmu, self._wiring, self._period, self._timeout = fmu, wiring, period, timeout
         self._instances, self._allow_compile = instances, allow_compile
-        self._values_in = sum(_size(wire.variable.shape) for wire in wiring.inputs)
+        self._values_in = sum(map(size, wiring.inputs))
         self._values_out = wiring.width
         self._request = struct.Struct(f"<qq{self._values_in * instances}d")
         self._answer = struct.Struct(f"<qq{self._values_out * instances}d")
@@ -120,10 +120,10 @@ class Host:
         assert self._folder is not None  # noqa: S101
         return Setup(
             folder=self._folder.name, version=self._fmu.version, identifier=interface.modelIdentifier or "",
-            token=self._fmu.description.guid, instances=self._instances,
+            token=self._fmu.description.guid or "", instances=self._instances,
             inputs=[wire.variable.valueReference for wire in wiring.inputs], values_in=self._values_in,
             outputs=[wire.variable.valueReference for wire in wiring.outputs], values_out=self._values_out,
-            parameters=[tuple(parameter) for parameter in wiring.parameters], period=self._period,
+            parameters=[(one.kind, one.reference, one.value) for one in wiring.parameters], period=self._period,
         )  # fmt: skip
 
     def _unpack(self, folder: Path) -> None:
@@ -134,7 +134,7 @@ class Host:
                 file.write_bytes(self._fmu.file.read_bytes())
                 compile_sources(file)
             with zipfile.ZipFile(file) as archive:
-                archive.extractall(folder)  # noqa: S202  (zipfile strips what would lead out of the folder)
+                archive.extractall(folder)  # it strips what would lead out of the folder
 
     def _write(self, data: bytes) -> None:
         try:
@@ -170,10 +170,3 @@ class Host:
         code = process.wait() if process is not None else 0
         self.stop()
         return f"crashed with {signal.Signals(-code).name}" if code < 0 else f"ended its process with code {code}"
-
-
-def _size(shape: tuple[int, ...] | None) -> int:
-    size = 1
-    for extent in shape or ():
-        size *= extent
-    return size

@@ -11,7 +11,7 @@ from phototaxis.errors import ComponentFailed
 from phototaxis_sensors.fmu.host import Failed, Host
 from phototaxis_sensors.fmu.rigs import Rig
 from phototaxis_sensors.fmu.wiring import Wire, Wiring, bounds
-from phototaxis_sensors.model import BUILT_IN, Moment, SensorModel
+from phototaxis_sensors.model import BuiltIn, Moment, SensorModel
 
 RESTARTS, WITHIN = 3, 60.0
 """An FMU that fails more than so many times within so many seconds keeps failing."""
@@ -22,7 +22,7 @@ REMEMBERED = 100_000
 class Step(NamedTuple):
     """What the FMU was given at one tick."""
 
-    count: int
+    periods: int
     """Periods since the tick before; more than 1 where ticks were missed."""
     inputs: list[float]
 
@@ -65,7 +65,7 @@ class Stepped:
         try:
             if fresh:
                 self._host.begin(inputs)
-            outputs = self._checked(self._host.step(inputs, step.count))
+            outputs = self._checked(self._host.step(inputs, step.periods))
         except Failed as why:
             outputs = self._again(why)
         if self._plain:
@@ -88,7 +88,7 @@ class Stepped:
                 self._host.begin(self._steps[0].inputs)
                 outputs: Sequence[float] = ()
                 for step in self._steps:
-                    outputs = self._host.step(step.inputs, step.count)
+                    outputs = self._host.step(step.inputs, step.periods)
                 return self._checked(outputs)
             except Failed as error:
                 why = error
@@ -97,9 +97,7 @@ class Stepped:
         for value in outputs:
             if not self._low <= value <= self._high:  # neither is NaN
                 self._host.stop()
-                raise Failed(
-                    f"its {self._output.variable.name} is {value:g}, not in {self._low:g} to {self._high:g}"
-                )
+                raise Failed(f"its {self._output.variable.name} is {value:g}, not in {self._low:g} to {self._high:g}")
         return outputs
 
 
@@ -124,10 +122,12 @@ class FmuModel:
         self._stepped, self._rig, self._fallback, self._name = stepped, rig, fallback, name
         self._failed = False
 
+    remembers = True
+
     @property
     def name(self) -> str:
         if self._failed:
-            return f"{BUILT_IN}, as {self._name} failed"
+            return f"{BuiltIn.name}, as {self._name} failed"
         anew = self._stepped.anew
         return self._name if anew < 0 else f"{self._name}, its state begun anew at tick {anew}"
 

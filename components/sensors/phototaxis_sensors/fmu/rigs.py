@@ -1,12 +1,11 @@
 """How many instances of an FMU stand for a robot's sensors, what they are given, and what becomes of their outputs."""
 
-import math
 from collections.abc import Sequence
 from typing import Protocol
 
 from phototaxis.arena import Arena
 
-from phototaxis_sensors.fmu.wiring import Wire, Wiring
+from phototaxis_sensors.fmu.wiring import Wiring, size
 from phototaxis_sensors.light import Sights
 from phototaxis_sensors.model import Moment, SensorModel
 
@@ -44,7 +43,7 @@ class Lamps:
         return found
 
     def collect(self, outputs: Sequence[float]) -> Sequence[float]:
-        return min(sum(outputs[: self._lamps]), 1.0), min(sum(outputs[self._lamps :]), 1.0)
+        return _clip(sum(outputs[: self._lamps]), 1.0), _clip(sum(outputs[self._lamps :]), 1.0)
 
 
 class Filters:
@@ -58,7 +57,7 @@ class Filters:
         return [self._wire.factor * reading + self._wire.offset for reading in self._builtin(moment)]
 
     def collect(self, outputs: Sequence[float]) -> Sequence[float]:
-        return [min(reading, 1.0) for reading in outputs]
+        return [_clip(reading, 1.0) for reading in outputs]
 
 
 class Beams:
@@ -67,15 +66,15 @@ class Beams:
     def __init__(self, wiring: Wiring, arena: Arena, builtin: SensorModel):
         self._builtin, self._farthest = builtin, arena.robot.sonar_range
         self.instances = len(arena.robot.sonars) // wiring.width
-        self._wires = [wire for wire in wiring.inputs for _ in range(_size(wire))] * self.instances
+        self._wires = [wire for wire in wiring.inputs for _ in range(size(wire))] * self.instances
 
     def feed(self, moment: Moment) -> list[float]:
         ranges = self._builtin(moment)
         return [wire.factor * distance + wire.offset for wire, distance in zip(self._wires, ranges, strict=True)]
 
     def collect(self, outputs: Sequence[float]) -> Sequence[float]:
-        return [min(distance, self._farthest) for distance in outputs]
+        return [_clip(distance, self._farthest) for distance in outputs]
 
 
-def _size(wire: Wire) -> int:
-    return math.prod(wire.variable.shape or (1,))
+def _clip(value: float, most: float) -> float:
+    return min(max(value, 0.0), most)

@@ -7,7 +7,9 @@ from typing import NamedTuple
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
+from phototaxis.messages import World
 
+from phototaxis_sensors.fmu.crowd import Crew, FmuCrowd
 from phototaxis_sensors.fmu.description import Fmu, read, require_library
 from phototaxis_sensors.fmu.host import Failed, Host
 from phototaxis_sensors.fmu.model import FmuModel, Stepped
@@ -72,6 +74,17 @@ class FmuSensors:
             else:
                 light = self._model(wired, arena, Lamps(wired.wiring, arena, Sights(arena, scene)), light)
         return Models(sonar, light)
+
+    def crowd(self, world: World, count: int) -> FmuCrowd:
+        """The sensors of `count` robots in a world; models made before are ended."""
+        self.close()
+        arena, crews = world.arena, dict[str, Crew]()
+        for kind, wired in self._wired.items():
+            sensors = len(arena.robot.sonars) // wired.wiring.width if kind == "sonar" else 2
+            each = sensors * (len(arena.lights) if kind == "light" and wired.wiring.ports != ["raw"] else 1)
+            host = self._host(wired, count * each, arena.motion.control_period)
+            crews[kind] = Crew(Stepped(host, wired.wiring, wired.label), wired.wiring)
+        return FmuCrowd(world, crews.get("sonar"), crews.get("light"))
 
     def close(self) -> None:
         """End the FMUs' processes."""

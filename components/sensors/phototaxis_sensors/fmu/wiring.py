@@ -86,7 +86,7 @@ class Wiring(NamedTuple):
     @property
     def width(self) -> int:
         """How many sensors one instance stands for."""
-        return sum(_size(wire.variable) for wire in self.outputs)
+        return sum(map(size, self.outputs))
 
     @property
     def ports(self) -> list[str]:
@@ -123,7 +123,12 @@ def connect(fmu: Fmu, suite: Suite, names: Mapping[str, str], parameters: Mappin
 
 
 def _count(wiring: Wiring, port: str) -> int:
-    return sum(_size(wire.variable) for wire in wiring.inputs if wire.port == port)
+    return sum(size(wire) for wire in wiring.inputs if wire.port == port)
+
+
+def size(wire: Wire) -> int:
+    """Number of values of a wire: more than 1 for an array."""
+    return _size(wire.variable)
 
 
 def _size(variable: ModelVariable) -> int:

@@ -1,0 +1,59 @@
+"""Which sensor models a suite is made of."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+from phototaxis.arena import Arena
+from phototaxis.errors import UserError
+from phototaxis.fmu import FmuOptions
+from phototaxis.messages import World
+
+from phototaxis_sensors.crowd import CrowdSuite
+from phototaxis_sensors.scene import Scene
+from phototaxis_sensors.suite import Models, built_in
+
+
+class Choice(Protocol):
+    """Makes the sensors of one robot, or of many."""
+
+    def __call__(self, arena: Arena, scene: Scene) -> Models: ...
+    def crowd(self, world: World, count: int) -> CrowdSuite:
+        """The sensors of `count` robots."""
+        ...
+
+
+class BuiltInChoice:
+    """The built-in models."""
+
+    def __call__(self, arena: Arena, scene: Scene) -> Models:
+        return built_in(arena, scene)
+
+    def crowd(self, world: World, count: int) -> CrowdSuite:
+        """The sensors of any number of robots."""
+        return CrowdSuite(world)
+
+
+@contextmanager
+def choose(options: FmuOptions) -> Iterator[Choice]:
+    """The built-in models, or FMUs, each of which is loaded once to see that it works.
+
+    Raises
+    ------
+    UserError
+        when an FMU cannot be used, an option does not fit it, or fmpy is not installed.
+    """
+    if options == FmuOptions():
+        yield BuiltInChoice()
+        return
+    try:
+        from phototaxis_sensors.fmu.sensors import FmuSensors
+    except ModuleNotFoundError as error:
+        line = f"an FMU needs the package {error.name}; install it with: pip install 'phototaxis[sensors,fmu]'"
+        raise UserError(line) from None
+    models = FmuSensors(options)
+    models.try_out()
+    try:
+        yield models
+    finally:
+        models.close()
