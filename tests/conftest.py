@@ -1,6 +1,7 @@
 """What all tests share: an arena, a setup."""
 
 import pytest
+from fmus import fmu as fmu
 from phototaxis.arena import Arena
 from phototaxis_agent.setup import Setup, make_setup
 from phototaxis_sim import arenas

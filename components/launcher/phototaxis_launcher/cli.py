@@ -36,6 +36,7 @@ VERBS = {
     "sensors": Verb("phototaxis_sensors.__main__:main", "sensors", "the sensors alone"),
     "agent": Verb("phototaxis_agent.__main__:main", "agent", "an agent alone"),
     "recorder": Verb("phototaxis_recorder.__main__:main", "recorder", "the recorder alone"),
+    "fmu": Verb("phototaxis_sensors.fmu.cli:main", "sensors,fmu", "look into, check or build FMUs (sensor models)"),
     "view": Verb("phototaxis_launcher.view:main", "recorder", "the live view or a recording, in a window or browser"),
     "recordings": Verb("phototaxis_launcher.recordings:main", "launcher", "list recordings; remove old ones"),
     "health": Verb("phototaxis_launcher.health:main", "launcher", "is this component on the bus? for health checks"),

@@ -13,7 +13,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from phototaxis_sensors.choice import choose
     from phototaxis_sensors.server import Server
 
-    with choose(models) as make:
+    with choose(models, one_cpu=True) as make:
         run("sensors", options, lambda bus: Server(bus, make).serve())
 
 

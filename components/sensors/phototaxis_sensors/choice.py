@@ -35,8 +35,10 @@ class BuiltInChoice:
 
 
 @contextmanager
-def choose(options: FmuOptions) -> Iterator[Choice]:
+def choose(options: FmuOptions, one_cpu: bool = False) -> Iterator[Choice]:
     """The built-in models, or FMUs, each of which is loaded once to see that it works.
+
+    With `one_cpu` the thread that uses FMUs stays on one CPU with them, which makes them three times as fast.
 
     Raises
     ------
@@ -51,7 +53,7 @@ def choose(options: FmuOptions) -> Iterator[Choice]:
     except ModuleNotFoundError as error:
         line = f"an FMU needs the package {error.name}; install it with: pip install 'phototaxis[sensors,fmu]'"
         raise UserError(line) from None
-    models = FmuSensors(options)
+    models = FmuSensors(options, one_cpu)
     models.try_out()
     try:
         yield models

@@ -34,7 +34,8 @@ def build(example: Example, version: Version, file: Path, sources_only: bool = F
         for name in (example.folder / f"{example.name}.c", FOLDER / f"fmi{version}.c", FOLDER / "model.h"):
             shutil.copy(name, sources)
         token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'phototaxis/fmu/{example.name}/{version}')}}}"
-        (sources / "variables.h").write_text(_header(example, token))
+        (sources / "names.h").write_text(_names(example))
+        (sources / "variables.h").write_text(_variables(example, token))
         _write(tree / "modelDescription.xml", (_fmi2 if version == 2 else _fmi3)(example, token))
         if version == 3:
             _write(sources / "buildDescription.xml", _recipe(example))
@@ -63,16 +64,22 @@ def compile_sources(archive: Path) -> None:
         raise UserError(f"the C sources do not compile: {said[0] if said else 'no reason given'} (needs gcc and make)")
 
 
-def _header(example: Example, token: str) -> str:
-    """variables.h: v[0] is the time, the others follow."""
-    lines = [f'#define TOKEN "{token}"']
-    starts, sizes = ["0"], ["1"]
+def _names(example: Example) -> str:
+    """names.h, for the model alone: `m->v[0]` is the time, the others follow."""
+    lines = ['#include "model.h"', ""]
     for variable, reference in _references(example):
         place = f"m->v + {reference}" if variable.size > 1 else f"m->v[{reference}]"
         lines.append(f"#define {variable.name} ({place})")
+    return "\n".join(lines) + "\n"
+
+
+def _variables(example: Example, token: str) -> str:
+    """variables.h, for the wrapper."""
+    starts, sizes = ["0"], ["1"]
+    for variable, _ in _references(example):
         starts += [repr(variable.start or 0.0)] * variable.size
         sizes += [str(variable.size), *["0"] * (variable.size - 1)]
-    lines += [f"#define VARIABLES {len(starts)}"]
+    lines = [f'#define TOKEN "{token}"', f"#define VARIABLES {len(starts)}"]
     lines += [f"#define {name} {{{', '.join(values)}}}" for name, values in (("STARTS", starts), ("SIZES", sizes))]
     return "\n".join(lines) + "\n"
 

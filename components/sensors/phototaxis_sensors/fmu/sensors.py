@@ -11,7 +11,7 @@ from phototaxis.messages import World
 
 from phototaxis_sensors.fmu.crowd import Crew, FmuCrowd
 from phototaxis_sensors.fmu.description import Fmu, read, require_library
-from phototaxis_sensors.fmu.host import Failed, Host
+from phototaxis_sensors.fmu.host import Failed, Host, stay_on_one_cpu
 from phototaxis_sensors.fmu.model import FmuModel, Stepped
 from phototaxis_sensors.fmu.rigs import Beams, Filters, Lamps, Rig
 from phototaxis_sensors.fmu.wiring import SUITES, Wiring, connect
@@ -37,14 +37,16 @@ class Wired(NamedTuple):
 class FmuSensors:
     """Makes the models of a suite: FMUs where the options name one, else the built-in ones.
 
+    With `one_cpu` the thread that uses them stays on one CPU, with the FMUs.
+
     Raises
     ------
     UserError
         when an FMU cannot be used, or an option does not fit it.
     """
 
-    def __init__(self, options: FmuOptions):
-        self._options = options
+    def __init__(self, options: FmuOptions, one_cpu: bool = False):
+        self._options, self._one_cpu = options, one_cpu
         files = {"light": options.light_fmu, "sonar": options.sonar_fmu}
         given = [kind for kind, file in files.items() if file]
         names, parameters = _pairs("fmu-map", options.fmu_map, given), _pairs("fmu-param", options.fmu_param, given)
@@ -65,6 +67,8 @@ class FmuSensors:
     def __call__(self, arena: Arena, scene: Scene) -> Models:
         """The models for an arena; those made before are ended."""
         self.close()
+        if self._one_cpu:
+            stay_on_one_cpu()
         sonar, light = built_in(arena, scene)
         for wired in self._wired.values():
             if wired.kind == "sonar":

@@ -177,7 +177,8 @@ def _only(fmu: Fmu, port: Port, causality: str) -> list[Wire]:
 
 
 def _listed(fmu: Fmu, causality: str) -> str:
-    return ", ".join(one.name for one in fmu.description.modelVariables if one.causality == causality) or "none"
+    names = [one.name for one in fmu.description.modelVariables if one.causality == causality]
+    return ", ".join([*names[:8], *(["…"] if len(names) > 8 else [])]) or "none"
 
 
 def _fits(fmu: Fmu, variable: ModelVariable, causality: str) -> None:

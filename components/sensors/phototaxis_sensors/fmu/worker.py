@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 from collections import deque
+from contextlib import suppress
 from typing import Any
 
 import msgspec
@@ -153,12 +154,11 @@ class Instance:
 class Worker:
     """All instances, and the buffers that they share."""
 
-    def __init__(self, setup: Setup):
-        self.said: deque[str] = deque(maxlen=1)
+    def __init__(self, setup: Setup, said: "deque[str]"):
         self.inputs = bytearray(HEAD.size + 8 * setup.values_in * setup.instances)
         self.outputs = bytearray(HEAD.size + 8 * setup.values_out * setup.instances)
         self.instances = [
-            Instance(setup, number, self.inputs, self.outputs, self.said) for number in range(setup.instances)
+            Instance(setup, number, self.inputs, self.outputs, said) for number in range(setup.instances)
         ]
 
     def answer(self) -> None:
@@ -204,8 +204,7 @@ def serve(source: int, answers: int) -> None:
     threading.Thread(target=_outlive, args=(parent, setup.folder), daemon=True).start()
     said: deque[str] = deque(maxlen=1)
     try:
-        worker = Worker(setup)
-        said = worker.said
+        worker = Worker(setup, said)
         os.write(answers, HEAD.pack(0, 0))
         while read(source, memoryview(worker.inputs)):
             worker.answer()
@@ -214,7 +213,10 @@ def serve(source: int, answers: int) -> None:
             one.end()
     except Exception as error:
         words = why(error, said).encode()
-        os.write(answers, HEAD.pack(FAILED, len(words)) + words)
+        with suppress(BrokenPipeError):
+            os.write(answers, HEAD.pack(FAILED, len(words)) + words)
+    if os.getppid() != parent:
+        shutil.rmtree(setup.folder, ignore_errors=True)
 
 
 def _outlive(parent: int, folder: str) -> None:

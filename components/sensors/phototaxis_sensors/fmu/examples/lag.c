@@ -1,7 +1,7 @@
 /* A first-order lag: the output follows the input with the time constant `tau`. */
 #include <math.h>
 
-#include "model.h"
+#include "names.h"
 
 int model_begin(Model *m) {
     y = m->state = u;

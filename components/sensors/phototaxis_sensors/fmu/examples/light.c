@@ -1,5 +1,5 @@
 /* The built-in light law: inverse square of the distance, full within 1 m; or linear up to `range`. */
-#include "model.h"
+#include "names.h"
 
 int model_begin(Model *m) { return model_step(m, 0); }
 

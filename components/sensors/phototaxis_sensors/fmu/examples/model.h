@@ -1,8 +1,9 @@
-/* What a model is to fmi2.c and fmi3.c: all its variables in one array, and two functions. */
+/* What a model is to fmi2.c and fmi3.c: all its variables in one array, and two functions.
+ * The model itself includes names.h, which is generated too and names each variable. */
 #ifndef MODEL_H
 #define MODEL_H
 
-#include "variables.h" /* generated: TOKEN, VARIABLES, STARTS, SIZES, and a name for each variable */
+#include "variables.h" /* generated: TOKEN, VARIABLES, STARTS, SIZES */
 
 typedef struct {
     double v[VARIABLES];

@@ -1,7 +1,7 @@
 /* A photodiode: sees best what is ahead, and saturates. `half` is the irradiance of half the full current. */
 #include <math.h>
 
-#include "model.h"
+#include "names.h"
 
 int model_begin(Model *m) { return model_step(m, 0); }
 

@@ -1,7 +1,7 @@
 /* A cheap ultrasonic ranger, 16 of them: nothing is nearer than `blind`, and ranges come in steps. */
 #include <math.h>
 
-#include "model.h"
+#include "names.h"
 
 int model_begin(Model *m) { return model_step(m, 0); }
 
