@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import fmu
 import gymnasium
 import handover
 import msgspec
@@ -88,6 +89,9 @@ def main() -> None:
     print(f"  {'single':>12} {gymnasium_single():12,.0f}")
     for count in (1, 16, 256, 4096):
         print(f"  {count:5} robots {gymnasium_many(count):12,.0f}")
+
+    print("\nSensor models from FMUs")
+    fmu.report(paper)
 
     print("\nCost of one tick by part, in one process, µs")
     bus = 1e6 / rates["four processes with recorder, ticks/s"] - 1e6 / rates["in-process, epochs/s"]

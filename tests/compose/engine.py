@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -39,13 +40,22 @@ class System:
 
     def __init__(self, name: str, folder: Path, environment: dict[str, str], bus: int, grpc: int, web: int):
         self.name, self.bus_port, self.grpc_port, self.web_port = name, bus, grpc, web
-        self._environment = environment
+        self._environment, self.folder = environment, folder
         self._files = ["-f", str(folder / "compose.yaml"), "-f", str(folder / "compose.own-router.yaml")]
         self.figures: dict[str, float] = {}
 
-    def compose(self, *words: str, check: bool = True) -> str:
+    def compose(self, *words: str, check: bool = True, **environment: str) -> str:
         """What `docker compose WORDS` prints."""
-        return docker("compose", "-p", self.name, *self._files, *words, check=check, **self._environment)
+        return docker("compose", "-p", self.name, *self._files, *words, check=check, **self._environment | environment)
+
+    def beside(self, name: str) -> "System":
+        """Another project of the same images, on ports of its own."""
+        bus, grpc, web = (free_port() for _ in range(3))
+        other = copy(self)
+        other.name, other.bus_port, other.grpc_port, other.web_port = name, bus, grpc, web
+        ports = {"BUS": bus, "GRPC": grpc, "WEB": web}
+        other._environment = self._environment | {f"PHOTOTAXIS_{what}_PORT": str(port) for what, port in ports.items()}
+        return other
 
     def inspect(self, service: str) -> dict[str, Any]:
         """What the engine knows of a service's container."""

@@ -1,5 +1,6 @@
 """docker compose for real: it comes up, answers where it says, survives kills, swaps the learner, leaves nothing."""
 
+import shutil
 import subprocess
 import time
 import urllib.request
@@ -7,8 +8,9 @@ from pathlib import Path
 
 import pytest
 from engine import DEADLINE, System, docker
+from fmus import Built
 from phototaxis.errors import Unavailable
-from phototaxis.messages import Status
+from phototaxis.messages import LogRequest, Status
 from rerun_files import RERUN, newest_tick
 
 ROLES = {"sim", "sensors", "agent", "recorder"}
@@ -105,6 +107,50 @@ def test_another_learner_takes_the_seat(system: System):
     assert later.run == before.run
     assert later.driver == after.driver
     assert [one.how for one in later.drivers][-1] == "took over"
+
+
+def test_a_sensor_model_from_a_mounted_fmu(system: System, fmu: Built):
+    shutil.copy(fmu("lag", 3), system.folder / "fmus" / "lag.fmu")
+    with system.bus() as bus:
+        before = system.until(bus, complete)
+        system.compose("up", "-d", "--wait", "sensors", PHOTOTAXIS_SENSORS_OPTIONS="--light-fmu /fmus/lag.fmu")
+        after = system.until(bus, lambda status: complete(status) and status.tick > before.tick + 100)
+        assert after.run == before.run
+        deadline = time.monotonic() + DEADLINE
+        while (log := bus.ask_one("log/sensors", LogRequest())) is None or log.light_model != "lag.fmu":
+            assert time.monotonic() < deadline, system.compose("logs", "sensors")
+
+
+def test_another_arena_is_another_run_and_another_recording(system: System):
+    with system.bus() as bus:
+        before = system.until(bus, complete)
+        system.compose("up", "-d", "--wait", "sim", PHOTOTAXIS_ARENA="doorway")
+        after = system.until(bus, lambda status: complete(status) and status.run != before.run and status.tick > 100)
+    deadline = time.monotonic() + DEADLINE
+    listing = "ls /recordings"
+    while f"{after.run}.rrd" not in (found := system.compose("exec", "-T", "recorder", "/bin/sh", "-c", listing)):
+        assert time.monotonic() < deadline, found
+    assert f"{before.run}.rrd" in found
+
+
+def test_a_second_project_is_a_second_world(system: System):
+    other = system.beside(f"{system.name}-b")
+    try:
+        other.compose("up", "-d", "--wait")
+        with system.bus() as bus, other.bus() as bus_b:
+            first, second = system.until(bus, complete), other.until(bus_b, complete)
+            assert first.run != second.run
+            assert system.until(bus, lambda status: status.tick > first.tick).run == first.run
+            assert other.until(bus_b, lambda status: status.tick > second.tick).run == second.run
+    finally:
+        other.compose("--profile", "*", "down", "--volumes", check=False)
+
+
+@pytest.mark.parametrize("learner", ["mirror", "dqn"])
+def test_the_other_learners_take_the_seat_too(system: System, learner: str):
+    with system.bus() as bus:
+        system.compose("up", "-d", "--wait", f"agent-{learner}")
+        system.until(bus, lambda status: status.driver.startswith(f"{learner}-") and complete(status))
 
 
 def test_down_leaves_nothing(system: System):

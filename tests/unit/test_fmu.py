@@ -204,6 +204,19 @@ def test_ten_thousand_episodes_with_one_load_take_no_more_memory(fmu: Built, pap
     assert sizes[1] - sizes[0] < 500_000
 
 
+@VERSIONS
+def test_an_fmu_that_a_process_can_have_once_has_a_process_for_each_sensor(
+    fmu: Built, paper: Arena, sensors, tmp_path, version
+):
+    flag = 'canBeInstantiatedOnlyOncePerProcess="true" '
+    once = described(fmu("lag", version), tmp_path / "o.fmu", "canHandle", flag + "canHandle")
+    alone = sensors(light_fmu=str(once))(paper, Scene(paper)).light
+    together = sensors(light_fmu=str(fmu("lag", version)))(paper, Scene(paper)).light
+    for moment in drive(60, episode=20):
+        assert alone(moment) == together(moment)
+    assert sum("fmu.worker" in " ".join(child.cmdline()) for child in psutil.Process().children()) == 3
+
+
 def test_a_suite_with_an_fmu_repeats_itself(fmu: Built, paper: Arena, sensors):
     make = sensors(light_fmu=str(fmu("lag", 3)))
     runs = []

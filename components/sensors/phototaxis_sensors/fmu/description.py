@@ -33,6 +33,12 @@ class Fmu(NamedTuple):
     def name(self) -> str:
         return self.file.name
 
+    @property
+    def once(self) -> bool:
+        """Whether a process can have only one instance of it."""
+        interface = self.description.coSimulation
+        return interface is not None and interface.canBeInstantiatedOnlyOncePerProcess
+
     def variable(self, name: str) -> ModelVariable | None:
         """The variable of that name."""
         return next((one for one in self.description.modelVariables if one.name == name), None)
@@ -65,8 +71,6 @@ def read(path: str) -> Fmu:
     description = _describe(path)
     if description.coSimulation is None:
         raise UserError(f"{path}: made for Model Exchange alone; needed is an FMU for Co-Simulation")
-    if description.coSimulation.needsExecutionTool:
-        raise UserError(f"{path}: runs only with the tool that made it; export it with its own solver")
     place = fmpy.platform if version == 2 else fmpy.platform_tuple
     library = f"binaries/{place}/{description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
     parts = [member.split("/") for member in members]

@@ -181,3 +181,30 @@ class Host:
         code = process.wait() if process is not None else 0
         self.stop()
         return f"crashed with {signal.Signals(-code).name}" if code < 0 else f"ended its process with code {code}"
+
+
+class Team:
+    """Instances of an FMU of which a process can have only one: a process each; otherwise as a `Host`."""
+
+    def __init__(self, members: Sequence[Host]):
+        self._members = members
+
+    def start(self) -> None:
+        for member in self._members:
+            member.start()
+
+    def begin(self, inputs: Sequence[float]) -> None:
+        for member, part in zip(self._members, self._parts(inputs), strict=True):
+            member.begin(part)
+
+    def step(self, inputs: Sequence[float], count: int = 1) -> tuple[float, ...]:
+        parts = zip(self._members, self._parts(inputs), strict=True)
+        return tuple(value for member, part in parts for value in member.step(part, count))
+
+    def stop(self) -> None:
+        for member in self._members:
+            member.stop()
+
+    def _parts(self, inputs: Sequence[float]) -> list[Sequence[float]]:
+        size = len(inputs) // len(self._members)
+        return [inputs[at : at + size] for at in range(0, len(inputs), size)]

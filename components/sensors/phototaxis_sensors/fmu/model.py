@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from phototaxis.errors import ComponentFailed
 
-from phototaxis_sensors.fmu.host import Failed, Host
+from phototaxis_sensors.fmu.host import Failed, Host, Team
 from phototaxis_sensors.fmu.rigs import Rig
 from phototaxis_sensors.fmu.wiring import Wire, Wiring, bounds
 from phototaxis_sensors.model import BuiltIn, Moment, SensorModel
@@ -37,7 +37,7 @@ class Stepped:
     label : names it in messages, as in "light FMU lag.fmu".
     """
 
-    def __init__(self, host: Host, wiring: Wiring, label: str):
+    def __init__(self, host: Host | Team, wiring: Wiring, label: str):
         self.label, self._host = label, host
         self._episode, self._tick = -1, -1
         self._steps: deque[Step] = deque(maxlen=REMEMBERED)

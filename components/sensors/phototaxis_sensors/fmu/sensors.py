@@ -11,7 +11,7 @@ from phototaxis.messages import World
 
 from phototaxis_sensors.fmu.crowd import Crew, FmuCrowd
 from phototaxis_sensors.fmu.description import Fmu, read, require_library
-from phototaxis_sensors.fmu.host import Failed, Host, stay_on_one_cpu
+from phototaxis_sensors.fmu.host import Failed, Host, Team, stay_on_one_cpu
 from phototaxis_sensors.fmu.model import FmuModel, Stepped
 from phototaxis_sensors.fmu.rigs import Beams, Filters, Lamps, Rig
 from phototaxis_sensors.fmu.wiring import SUITES, Wiring, connect
@@ -56,7 +56,7 @@ class FmuSensors:
             wiring = connect(fmu, SUITES[kind], names[kind], parameters[kind])
             require_library(fmu, options.allow_compile)
             self._wired[kind] = Wired(kind, fmu, wiring)
-        self._running: list[Host] = []
+        self._running: list[Host | Team] = []
 
     def try_out(self, period: float = 0.1) -> None:
         """Load each FMU once, so that what is wrong is said before a run."""
@@ -95,13 +95,18 @@ class FmuSensors:
         while self._running:
             self._running.pop().stop()
 
-    def _host(self, wired: Wired, instances: int, period: float) -> Host:
+    def _host(self, wired: Wired, instances: int, period: float) -> Host | Team:
         self._warn(wired, period)
         options = self._options
-        host = Host(wired.fmu, wired.wiring, instances, period, options.fmu_timeout, options.allow_compile)
+        rest = period, options.fmu_timeout, options.allow_compile
+        if wired.fmu.once and instances > 1:
+            host = Team([Host(wired.fmu, wired.wiring, 1, *rest) for _ in range(instances)])
+        else:
+            host = Host(wired.fmu, wired.wiring, instances, *rest)
         try:
             host.start()
         except Failed as why:
+            host.stop()
             raise UserError(f"{wired.fmu.file}: {why}") from None
         self._running.append(host)
         return host

@@ -157,9 +157,7 @@ class Worker:
     def __init__(self, setup: Setup, said: "deque[str]"):
         self.inputs = bytearray(HEAD.size + 8 * setup.values_in * setup.instances)
         self.outputs = bytearray(HEAD.size + 8 * setup.values_out * setup.instances)
-        self.instances = [
-            Instance(setup, number, self.inputs, self.outputs, said) for number in range(setup.instances)
-        ]
+        self.instances = [Instance(setup, number, self.inputs, self.outputs, said) for number in range(setup.instances)]
 
     def answer(self) -> None:
         """Do what the head of the inputs says."""

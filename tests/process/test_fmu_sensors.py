@@ -255,3 +255,14 @@ def test_without_fmpy_it_says_what_to_install(fmu: Built):
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr.strip().endswith("pip install 'phototaxis[sensors,fmu]'")
+
+
+def test_an_fmu_in_python(tmp_path):
+    example = Path(__file__).parents[2] / "examples" / "python_fmu.py"
+    build = [sys.executable, "-m", "pythonfmu", "build", "-f", example, "-d", tmp_path]
+    subprocess.run(build, capture_output=True, check=True)
+    file = tmp_path / "TiringEye.fmu"
+    done = phototaxis("fmu", "check", file, "--fmu-param", "recovery=5")
+    assert done.returncode == 0, done.stderr
+    assert "light: 400 ticks in 8 episodes" in done.stdout
+    assert "not as the standard has it: ModelStructure/InitialUnknowns" in done.stderr
