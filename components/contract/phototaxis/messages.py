@@ -178,16 +178,20 @@ class Control(Message):
     """A request to the simulation."""
 
     verb: Literal[
-        "status", "pause", "resume", "step", "speed", "reset", "stop", "claim", "take over", "stand by", "release"
-    ]
-    """claim: sit down on a free seat. take over: at the first tick boundary from tick `at` on. stand by: when nobody
-    else drives any more. release: leave the seat, or the queue for it."""
+        "status", "pause", "resume", "step", "speed", "reset", "begin", "stop",
+        "claim", "take over", "stand by", "release",
+    ]  # fmt: skip
+    """begin: a new run with `seed`; who drives, drives on. claim: sit down on a free seat. take over: at the first
+    tick boundary from tick `at` on. stand by: when nobody else drives any more. release: leave the seat, or the
+    queue for it."""
     agent: Name = ""
     """Of the last four verbs: whose seat."""
     at: Count = 0
     """take over: from which tick on."""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """speed: 0 is lockstep."""
+    seed: int = 0
+    """begin: of the new run."""
 
 
 class ControlReply(Message):

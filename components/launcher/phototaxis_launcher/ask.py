@@ -25,10 +25,12 @@ class StatusOptions(BusOptions, kw_only=True):
 class ControlOptions(BusOptions, kw_only=True):
     """Options of `phototaxis control`."""
 
-    verb: Literal["pause", "resume", "step", "speed", "reset", "stop"] = "pause"
-    """what to do; step: one tick of a paused simulation; reset: end the episode"""
+    verb: Literal["pause", "resume", "step", "speed", "reset", "begin", "stop"] = "pause"
+    """what to do; step: one tick of a paused simulation; reset: end the episode; begin: a new run"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """for the verb speed: simulated seconds per second; 0: lockstep"""
+    seed: int = 0
+    """for the verb begin: of the new run"""
 
 
 def request(options: BusOptions, control: Control) -> ControlReply:
@@ -60,9 +62,9 @@ def status(argv: Sequence[str]) -> int:
 
 
 def control(argv: Sequence[str]) -> int:
-    about = "Pause, resume, single-step, re-pace, reset or stop the running simulation."
+    about = "Pause, resume, single-step, re-pace, reset, begin anew or stop the running simulation."
     options = parse(ControlOptions, argv, "phototaxis control", about, positional=["verb"])
-    reply = request(options, Control(options.verb, speed=options.speed))
+    reply = request(options, Control(options.verb, speed=options.speed, seed=options.seed))
     if not reply.ok:
         raise UserError(reply.reason)
     print("\n".join(describe(reply.status)), file=sys.stderr)

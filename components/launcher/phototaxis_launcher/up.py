@@ -143,7 +143,7 @@ class Run:
                         break
                     if event is not None and event.topic == "launch":
                         self._launch(event, progress)
-                    if event is not None and event.topic == "status" and event.message.run == self.name:
+                    if event is not None and event.topic == "status":
                         status = event.message
                         progress.show(status)
                         self._report(status, progress)

@@ -9,7 +9,7 @@ import msgspec
 from phototaxis.bus import Bus, Event
 from phototaxis.chunks import Chunks
 from phototaxis.journal import Journal
-from phototaxis.messages import Command, Control, ControlReply, End, Phase, SimLog, State, Status
+from phototaxis.messages import Command, Control, ControlReply, End, Phase, SimLog, State, Status, run_name
 from phototaxis.protocol import Question
 
 from phototaxis_sim.pace import Pace
@@ -225,9 +225,24 @@ class Server:
             if self._finished or self._sim.finished:
                 return "the run is finished"
             self._apply(Entry(0.0, 0.0, self._seat.driver, "asked"))
+        elif verb == "begin":
+            self._begin(request.seed)
         elif verb == "stop":
             self._bus.stop()
         return ""
+
+    def _begin(self, seed: int) -> None:
+        """A new run in the same arena, under a name of its own."""
+        self._log.flush()
+        world = self._sim.world
+        self._sim = Simulation(world.arena, seed, run_name(), world.epochs)
+        self._held, self._started, self._finished = None, None, False
+        self._recent.clear()
+        self._ended.clear()
+        self._rate_at = self._rate = self._mean_rate = 0.0
+        if self._journal is not None:
+            self._journal.begin(self._header())
+        self._ask()
 
     def _reseat(self, request: Control) -> str:
         """Do what an agent asks about the seat; a reason when it is refused, else ""."""

@@ -1,0 +1,156 @@
+"""The Gymnasium environment as a client of a running system: the same trajectories, rules and errors."""
+
+import signal
+import subprocess
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import Error, InvalidAction, ResetNeeded
+from gymnasium.utils.env_checker import check_env
+from rerun_files import series
+from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
+from support import Process, observer, wait_status
+
+NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
+PERCEPTS = ("simple", "rich", "continuous", "sensors")
+VARIANTS = [(percept, action) for percept in PERCEPTS for action in ("discrete", "continuous")]
+
+
+@pytest.fixture
+def system(start: Callable[..., Process], world: str) -> Iterator[dict[str, Process]]:
+    """A simulation and sensors that wait for a driver."""
+    started = {role: start(role, "--name", world) for role in ("sim", "sensors")}
+    with observer(world) as bus:
+        wait_status(bus, lambda status: any(who.startswith("sensors/") for who in status.alive), *started.values())
+    yield started
+    for process in started.values():
+        process.kill()
+
+
+def make(world: str, **options) -> gymnasium.Env:
+    return gymnasium.make(NAME, connect="local", world=world, timeout=20.0, **options)
+
+
+def walk(environment: gymnasium.Env, steps: int, seed: int) -> list[tuple]:
+    """What it answers to random actions, with resets at the ends and a seed in the middle."""
+    rng = np.random.default_rng(seed)
+    seen, found = environment.reset(seed=seed)[0], []
+    for step in range(steps):
+        answer = environment.step(rng.integers(9))
+        found.append((seen, *answer[:4], answer[4]["tick"], answer[4]["episode_number"]))
+        seen = answer[0]
+        if step == steps // 2:
+            seen = environment.reset(seed=seed + 1)[0]
+        elif answer[2] or answer[3] or rng.random() < 0.01:
+            seen = environment.reset()[0]
+    return found
+
+
+def test_ten_thousand_steps_are_the_same_here_and_there(system, world):
+    here, there = gymnasium.make(NAME, percept="sensors"), make(world, percept="sensors")
+    for one, other in zip(walk(here, 10_000, 5), walk(there, 10_000, 5), strict=True):
+        np.testing.assert_array_equal(one[0], other[0])
+        np.testing.assert_array_equal(one[1], other[1])
+        assert one[2:] == other[2:]
+    there.close()
+
+
+def test_the_checkers_find_nothing(system, world):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for percept, action in VARIANTS:
+            environment = make(world, percept=percept, action=action)
+            check_env(environment.unwrapped)
+            check_env_for_sb3(environment)
+            environment.close()
+
+
+def test_it_takes_the_seat_of_a_recorded_run_and_leaves_it(start, up, world, tmp_path):
+    launcher = up("--epochs", 0)
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.tick > 50, launcher)
+        environment = make(world, percept="continuous")
+        environment.reset(seed=3)
+        for _ in range(30):
+            environment.step(4)
+        status = wait_status(bus, lambda status: status.driver.startswith("gymnasium-"), launcher)
+        environment.close()
+        wait_status(bus, lambda status: status.driver.startswith("qtable-"), launcher)  # it had waited
+    launcher.popen.send_signal(signal.SIGINT)
+    assert launcher.end() == 0
+    recordings = sorted((tmp_path / "runs").glob("*/recording*.rrd"))
+    assert len(recordings) == 2, "a seed is a new run"
+    trail = series(recordings[-1], "/world/trail", "Points2D:positions")
+    assert set(range(20)) <= set(trail)
+    assert status.run
+
+
+def test_errors_are_gymnasiums_own(system, world, start):
+    environment = make(world)
+    with pytest.raises(ResetNeeded):
+        environment.unwrapped.step(0)
+    environment.reset(seed=1)
+    with pytest.raises(InvalidAction):
+        environment.unwrapped.step(9)
+    with pytest.raises(Error, match="render_mode 'rgb_array': that is the running system's"):
+        make(world, render_mode="rgb_array")
+    with pytest.raises(Error, match="arena 'doorway': that is the running system's"):
+        make(world, arena="doorway")
+    other = make(world)
+    other.reset(seed=2)
+    with pytest.raises(Error, match="holds the seat now"):
+        environment.step(0)
+    environment.reset(seed=3)
+    environment.step(0)
+    environment.close()
+    other.close()
+    with pytest.raises(Error, match="closed"):
+        environment.unwrapped.step(0)
+
+
+def test_nobody_there(world):
+    with pytest.raises(Error, match=f"no simulation answers in the world '{world}'"):
+        gymnasium.make(NAME, connect="local", world=world, timeout=0.3)
+    with pytest.raises(Error, match="the bus cannot be opened"):
+        gymnasium.make(NAME, connect="tcp/127.0.0.1:1", timeout=0.3)
+
+
+@pytest.mark.parametrize("role", ["sim", "sensors"])
+def test_a_killed_component_is_an_error_and_no_hang(system, world, role):
+    environment = gymnasium.make(NAME, connect="local", world=world, timeout=1.5)
+    environment.reset(seed=1)
+    system[role].kill()
+    with pytest.raises(Error, match=f"{role} not there"):
+        walk(environment, 100, 1)
+    environment.close()
+
+
+def test_killed_sensors_that_come_back_are_not_noticed(system, world, start):
+    here, there = gymnasium.make(NAME, percept="sensors"), make(world, percept="sensors")
+    expected = walk(here, 600, 2)
+    found: list[tuple] = []
+    walker = threading.Thread(target=lambda: found.extend(walk(there, 600, 2)))
+    walker.start()
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.tick > 100, system["sim"])
+        system["sensors"].kill()
+        system["sensors"] = start("sensors", "--name", world)
+    walker.join()
+    for one, other in zip(expected, found, strict=True):
+        np.testing.assert_array_equal(one[1], other[1])
+    there.close()
+
+
+def test_a_program_that_forgets_to_close_ends_and_frees_the_seat(system, world):
+    script = (
+        f"import gymnasium; e = gymnasium.make({NAME!r}, connect='local', world={world!r}); e.reset(seed=1); e.step(4)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+    with observer(world) as bus:
+        wait_status(bus, lambda status: not status.driver, system["sim"])
