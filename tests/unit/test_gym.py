@@ -208,8 +208,9 @@ def test_pictures(monkeypatch):
     window.close()
 
 
-def test_the_example_of_stable_baselines_learns():
-    words = [sys.executable, ROOT / "examples/sb3_dqn.py", "--steps", "4000"]
+@pytest.mark.parametrize(("learner", "steps"), [("dqn", 4000), ("ppo", 6000)])
+def test_the_example_of_stable_baselines_learns(learner, steps):
+    words = [sys.executable, ROOT / "examples/sb3.py", "--learner", learner, "--steps", str(steps)]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout.split("seed 0: ")[1].split("%")[0]) >= 95

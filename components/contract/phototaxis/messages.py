@@ -16,6 +16,9 @@ from phototaxis.arena import Arena
 SCHEMA = 1
 """Version of the message schema; both sides of a bus must have the same."""
 
+MOST = 4096
+"""Robots that a world may have."""
+
 Motor = Annotated[float, Meta(ge=-1, le=1)]
 Name = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$")]
 Count = Annotated[int, Meta(ge=0)]
@@ -43,6 +46,9 @@ class World(Message):
     seed: int
     epochs: Count
     """Learning steps after which the run is finished; 0: it goes on until it is stopped."""
+    robots: Annotated[int, Meta(ge=1, le=MOST)] = 1
+    """How many robots there are, each alone in an arena of its own; with more than one the messages `…OfMany` are
+    used."""
 
 
 class State(Message):
@@ -105,6 +111,63 @@ class Command(Message):
     right: Motor
     end: End = ""
     """Not "": end the episode instead of moving; the next tick begins a new one at a fresh placement."""
+
+
+class StateOfMany(Message):
+    """The worlds of N robots at one tick. Columns are little-endian arrays with N as the last axis."""
+
+    run: Name
+    tick: Count
+    epoch: Count
+    """Motor commands applied so far in this run, to all robots."""
+    time: float
+    episode: bytes
+    """(N,) int64: each robot's own count."""
+    pose: bytes
+    """(3, N) float64: x, y, heading."""
+    contact: bytes
+    """(2, N) uint8: front and rear, during the last control period."""
+    left: bytes
+    """(N,) float64: the command just applied, and who gave it ("" for none)."""
+    right: bytes
+    author: Name
+    driver: Name
+    hash: str
+    """Chained over all states of the run."""
+
+
+class ReadingsOfMany(Message):
+    """What N robots sense at one tick. Columns are little-endian arrays with N as the last axis."""
+
+    run: Name
+    tick: Count
+    epoch: Count
+    episode: bytes
+    """(N,) int64."""
+    sonar: bytes
+    """(16, N) float64, m."""
+    light: bytes
+    """(2, N) float64, 0..1: front left, front right."""
+    contact: bytes
+    """(2, N) uint8: front and rear bumper."""
+    left: bytes
+    """(N,) float64: echo of the state, with author and driver."""
+    right: bytes
+    author: Name
+    driver: Name
+
+
+class CommandOfMany(Message):
+    """The seated agent's answer for N robots at one tick. Columns are little-endian arrays."""
+
+    run: Name
+    tick: Count
+    author: Name
+    left: bytes
+    """(N,) float64 in −1..1."""
+    right: bytes
+    end: bytes
+    """(N,) uint8: 0 drive on, else the episode's end: 1 reached, 2 cap, 3 asked. The robot is then placed anew."""
 
 
 class Episode(Message):
@@ -242,6 +305,8 @@ class LaunchReply(Message):
 
 
 Column = list[float]
+ENDS: tuple[End, ...] = ("", "reached", "cap", "asked")
+"""By the number that `CommandOfMany` has for them."""
 
 
 class SimLog(Message):

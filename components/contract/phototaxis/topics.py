@@ -37,6 +37,9 @@ TOPICS = {
         Topic("state", m.State, "sim", "stream", 4_096, "pose, contacts, applied command, seat holder"),
         Topic("readings", m.Readings, "sensors", "stream", 4_096, "sonars, lights, bumpers, echoed command"),
         Topic("command", m.Command, "agent", "stream", 4_096, "the answer: two motors, or the episode's end"),
+        Topic("crowd/state", m.StateOfMany, "sim", "stream", 1_000_000, "the same of many robots at once"),
+        Topic("crowd/readings", m.ReadingsOfMany, "sensors", "stream", 2_000_000, "the same of many robots at once"),
+        Topic("crowd/command", m.CommandOfMany, "agent", "stream", 200_000, "the same for many robots at once"),
         Topic("episode", m.Episode, "sim", "stream", 4_096, "one episode, when it has ended"),
         Topic("status", m.Status, "sim", "stream", 32_768, "how the run is doing, 5 times a second"),
         Topic(
@@ -87,10 +90,14 @@ class Role(NamedTuple):
 
 
 ROLES = {
-    "sim": Role(reads=("command",), dials=()),
-    "sensors": Role(reads=("state",), dials=("sim",), asks=("world", "log/sim")),
+    "sim": Role(reads=("command", "crowd/command"), dials=()),
+    "sensors": Role(reads=("state", "crowd/state"), dials=("sim",), asks=("world", "log/sim")),
     "recorder": Role(reads=("log/sim", "log/sensors", "log/agent"), dials=("sim", "sensors"), asks=("world",)),
-    "agent": Role(reads=("readings",), dials=("sim", "sensors", "recorder"), asks=("world", "control", "checkpoint")),
+    "agent": Role(
+        reads=("readings", "crowd/readings"),
+        dials=("sim", "sensors", "recorder"),
+        asks=("world", "control", "checkpoint"),
+    ),
     "launcher": Role(reads=("status",), dials=("sim",), asks=("control",)),
     "observer": Role(reads=("status",), dials=("sim", "launcher"), listens=False, asks=("world", "control", "launch")),
 }

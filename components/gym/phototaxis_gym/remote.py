@@ -2,21 +2,25 @@
 
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from typing import Any
 
+import numpy as np
 from gymnasium.error import Error
 from phototaxis.bus import Bus, Event
+from phototaxis.columns import FLAG, pack, unpack
 from phototaxis.component import made_up
 from phototaxis.errors import UserError
-from phototaxis.messages import Command, Control, End, Readings
+from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, Refused, World
 from phototaxis.session import BusOptions, open_session
+from phototaxis.task import CrowdReadings
 
 SEEK_EVERY = 0.2
 
 
-class There:
-    """A running system: simulation and sensors, and whoever records and watches.
+class Link:
+    """The driver's seat of a running system: simulation and sensors, and whoever records and watches.
 
     Parameters
     ----------
@@ -30,8 +34,6 @@ class There:
     gymnasium.error.Error
         here and in every call: when nobody answers in time, or somebody else has taken the seat.
     """
-
-    pose = None
 
     def __init__(self, connect: str, world: str, timeout: float):
         self._present: set[str] = set()
@@ -54,44 +56,44 @@ class There:
             found = self._bus.ask_one("world", timeout=timeout) if "sim" in self._present else None
             if found is None:
                 raise Error(f"no simulation answers in {self._where}; start one: phototaxis up --epochs 0")
-            self.arena = found.arena
+            self.world: World = found
+            self._prefix = "crowd/" if found.robots > 1 else ""
             self._closing = weakref.finalize(self, stack.pop_all().close)
-        self._now: Readings | None = None
+        self._now: Any = None
         self._sought_at = 0.0
 
-    def begin(self, seed: int) -> Readings:
-        """A run with this seed; whoever drives is asked to hand over first."""
+    @property
+    def ident(self) -> str:
+        """Our name on the bus."""
+        return self._bus.ident
+
+    def begin(self, seed: int) -> Any:
+        """The first readings of a run with this seed; whoever drives is asked to hand over first."""
         self._sit()
-        reply = self._bus.control(Control("begin", self._bus.ident, seed=seed), timeout=self._timeout)
+        reply = self._bus.control(Control("begin", self.ident, seed=seed), timeout=self._timeout)
         if reply is None or not reply.ok:
             raise Error(f"{self._where} does not begin anew: {reply.reason if reply else 'no answer'}")
         self._now = self._hear(lambda readings: readings.run == reply.status.run)
         return self._now
 
-    def drive(self, left: float, right: float) -> Readings:
-        return self._answer(left, right, "")
-
-    def place(self, end: End) -> Readings:
-        return self._answer(0.0, 0.0, end)
+    def answer(self, make: Callable[[str, int], Command | CommandOfMany]) -> Any:
+        """Answer the present tick with what `make` makes of its run and number; the readings of the next."""
+        before = self._now
+        if before is None or not self._closing.alive:
+            raise Error("the environment is closed" if before else "reset() comes before step()")
+        topic, command = f"{self._prefix}command", make(before.run, before.tick)
+        self._bus.put(topic, command)
+        self._now = self._hear(
+            lambda readings: readings.run == before.run and readings.tick > before.tick,
+            lambda readings: self._bus.put(topic, command) if readings.tick == before.tick else None,
+        )
+        return self._now
 
     def close(self) -> None:
         """Leave the seat and the bus."""
         if self._closing.alive:
-            self._bus.control(Control("release", self._bus.ident), timeout=0.5)
+            self._bus.control(Control("release", self.ident), timeout=0.5)
             self._closing()
-
-    def _answer(self, left: float, right: float, end: End) -> Readings:
-        """Answer the present tick; the readings of the next."""
-        before = self._now
-        if before is None or not self._closing.alive:
-            raise Error("the environment is closed" if before else "reset() comes before step()")
-        command = Command(before.run, before.tick, self._bus.ident, left, right, end)
-        self._bus.put("command", command)
-        self._now = self._hear(
-            lambda readings: readings.run == before.run and readings.tick > before.tick,
-            lambda readings: self._bus.put("command", command) if readings.tick == before.tick else None,
-        )
-        return self._now
 
     def _sit(self) -> None:
         """Take the seat, if it is not ours."""
@@ -99,26 +101,26 @@ class There:
         def seek(_: object = None) -> None:
             if time.monotonic() >= self._sought_at:
                 self._sought_at = time.monotonic() + SEEK_EVERY
-                self._bus.control(Control("take over", self._bus.ident))
+                self._bus.control(Control("take over", self.ident))
 
         self._sought_at = 0.0
         seek()
-        self._hear(lambda readings: readings.driver == self._bus.ident, seek, seated=False)
+        self._hear(lambda readings: readings.driver == self.ident, seek, seated=False)
 
     def _hear(
         self,
-        wanted: Callable[[Readings], bool],
-        otherwise: Callable[[Readings], object] = lambda _: None,
+        wanted: Callable[[Any], bool],
+        otherwise: Callable[[Any], object] = lambda _: None,
         seated: bool = True,
-    ) -> Readings:
+    ) -> Any:
         """The first readings that are wanted; what else comes goes to `otherwise`."""
         deadline = time.monotonic() + self._timeout
         while (left := deadline - time.monotonic()) > 0:
             event = self._bus.receive(timeout=left)
             self._notice(event)
-            if event is not None and event.topic == "readings":
-                readings: Readings = event.message
-                if seated and readings.driver != self._bus.ident:
+            if event is not None and event.topic == f"{self._prefix}readings":
+                readings = event.message
+                if seated and readings.driver != self.ident:
                     raise Error(f"{readings.driver or 'nobody'} holds the seat now; reset(seed=…) takes it back")
                 if wanted(readings):
                     return readings
@@ -131,3 +133,66 @@ class There:
         """Who is there."""
         if event is not None and event.topic in ("alive", "gone"):
             (self._present.add if event.topic == "alive" else self._present.discard)(event.message[0])
+
+
+class There:
+    """One robot behind the bus."""
+
+    pose = None
+
+    def __init__(self, connect: str, world: str, timeout: float):
+        self._link = Link(connect, world, timeout)
+        self.arena = self._link.world.arena
+        if self._link.world.robots > 1:
+            self._link.close()
+            raise Error(f"the world '{world}' has {self._link.world.robots} robots: gymnasium.make_vec drives them")
+
+    def begin(self, seed: int) -> Readings:
+        """A new run with this seed."""
+        return self._link.begin(seed)
+
+    def drive(self, left: float, right: float) -> Readings:
+        return self._link.answer(lambda run, tick: Command(run, tick, self._link.ident, left, right))
+
+    def place(self, end: End) -> Readings:
+        return self._link.answer(lambda run, tick: Command(run, tick, self._link.ident, 0.0, 0.0, end))
+
+    def close(self) -> None:
+        """Leave the seat and the bus."""
+        self._link.close()
+
+
+class ManyThere:
+    """N robots behind the bus."""
+
+    poses = None
+
+    def __init__(self, connect: str, world: str, timeout: float, count: int):
+        self._link, self._count = Link(connect, world, timeout), count
+        self.arena = self._link.world.arena
+        if self._link.world.robots != count or count == 1:
+            self._link.close()
+            why = "one robot is for gymnasium.make" if count == 1 else f"start it with --robots {count}"
+            raise Error(f"the world '{world}' has {self._link.world.robots} robots, num_envs is {count}; {why}")
+
+    def begin(self, seeds: Sequence[int]) -> CrowdReadings:
+        """A new run; the seeds must follow one another."""
+        if list(seeds) != list(range(seeds[0], seeds[0] + self._count)):
+            raise Error("behind the bus the robots' seeds are S, S + 1, S + 2, …: give reset one number")
+        return self._senses(self._link.begin(seeds[0]))
+
+    def drive(self, motors: np.ndarray, ends: np.ndarray) -> CrowdReadings:
+        columns = pack(motors[0]), pack(motors[1]), pack(ends, FLAG)
+        return self._senses(self._link.answer(lambda run, tick: CommandOfMany(run, tick, self._link.ident, *columns)))
+
+    def close(self) -> None:
+        """Leave the seat and the bus."""
+        self._link.close()
+
+    def _senses(self, readings: ReadingsOfMany) -> CrowdReadings:
+        try:
+            sonar, light = unpack(readings.sonar, self._count, 16), unpack(readings.light, self._count, 2)
+            front, rear = unpack(readings.contact, self._count, 2, FLAG).astype(bool)
+        except Refused as why:
+            raise Error(f"the sensors' readings cannot be used: {why}") from None
+        return CrowdReadings(sonar, light, front, rear)

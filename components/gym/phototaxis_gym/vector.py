@@ -1,4 +1,4 @@
-"""Many robots as one vector environment, stepped together: shared pymunk spaces, the rest in NumPy."""
+"""Many robots as one vector environment, stepped together: in shared pymunk spaces and NumPy, or behind the bus."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -10,19 +10,17 @@ from gymnasium.error import Error, InvalidAction, ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from phototaxis.errors import UserError
-from phototaxis.messages import World
+from phototaxis.messages import ENDS
 from phototaxis.task import EQUAL, STEPS, CrowdReadings, lit
-from phototaxis_sensors.crowd import CrowdSuite
 from phototaxis_sim import arenas
-from phototaxis_sim.crowd import Crowd
-from phototaxis_sim.physics import Physics, Pose
 
 from phototaxis_gym import CAP
+from phototaxis_gym.place import ManyHere, Places
+from phototaxis_gym.remote import ManyThere
 from phototaxis_gym.spaces import MOTORS, actions, observation, rewards
 
-TOGETHER = 256
-"""Robots that share a pymunk space: they overlap without touching, which its index pays for."""
 SEEDS = 2**31
+REACHED, CAPPED = ENDS.index("reached"), ENDS.index("cap")
 
 
 class LightSeekers(VectorEnv[Any, Any, Any]):
@@ -30,7 +28,8 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
 
     Robot i begins with the placements of the seed `seed + i`, episode after episode (or of the i-th of several
     seeds). A robot whose episode has ended is placed anew by the next step, which ignores its action
-    (`AutoresetMode.NEXT_STEP`). Sensor noise is that of the first seed.
+    (`AutoresetMode.NEXT_STEP`). Sensor noise is that of the first seed. With `connect` the robots are those of a
+    running system that was started with `--robots`.
     """
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - Gymnasium's form
@@ -39,27 +38,33 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         self,
         num_envs: int = 1,
         percept: str = "simple",
-        arena: str = "paper",
+        arena: str = "",
         reward: str = "own",
         action: Literal["discrete", "continuous"] = "discrete",
         cap: int = CAP,
         render_mode: str | None = None,
+        connect: str = "",
+        world: str = "phototaxis",
+        timeout: float = 10.0,
     ):
         if render_mode is not None:
             raise Error(f"render_mode {render_mode}: many robots are not drawn; leave it out")
+        if connect and arena:
+            raise Error(f"arena '{arena}': that is the running system's; leave it out with connect")
+        self.num_envs, self._cap = num_envs, cap
         try:
-            self._arena = arenas.load(arena)
+            self._place: Places = (
+                ManyThere(connect, world, timeout, num_envs) if connect else ManyHere(arenas.load(arena or "paper"))
+            )
         except UserError as error:
             raise Error(str(error)) from None
-        self.num_envs, self._cap = num_envs, cap
-        self._observe, self._reward = observation(percept, self._arena), rewards(reward, percept)
+        arena_ = self._place.arena
+        self._observe, self._reward = observation(percept, arena_), rewards(reward, percept)
         self.single_observation_space, self.single_action_space = self._observe.space, actions(action)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._discrete = action == "discrete"
-        self._physics = Physics(self._arena)
-        self._crowds: list[Crowd] = []
-        self._groups = [slice(start, start + TOGETHER) for start in range(0, num_envs, TOGETHER)]
+        self._readings: CrowdReadings | None = None
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -67,38 +72,34 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         """Begin an episode of every robot; without a seed with placements that follow from the last seed."""
         count = self.num_envs
         super().reset(seed=seed if isinstance(seed, int) else None)
-        given = [None] * count if seed is None else [seed + i for i in range(count)] if isinstance(seed, int) else seed
-        self._seeds = [int(self.np_random.integers(SEEDS)) if one is None else one for one in given]
+        first = int(self.np_random.integers(SEEDS)) if seed is None else seed
+        given = [first + row for row in range(count)] if isinstance(first, int) else first
+        seeds = [int(self.np_random.integers(SEEDS)) if one is None else one for one in given]
         self._episodes, self._steps = np.zeros(count, int), np.zeros(count, int)
-        self._ended = np.zeros(count, bool)
-        self._tick = 0
-        self._suite = CrowdSuite(World("gymnasium", self._arena, self._seeds[0], 0))
+        self._ends = np.zeros(count, np.uint8)
         self._memory = Memories(count)
-        starts = [self._placement(row) for row in range(count)]
-        self._crowds = [Crowd(self._arena, starts[group]) for group in self._groups]
-        return self._look(), self._info()
+        return self._look(self._place.begin(seeds)), self._info()
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold an action for one control period."""
-        if not self._crowds:
+        if self._readings is None:
             raise ResetNeeded("reset() comes before step()")
-        motors = self._motors(np.asarray(actions))
-        fresh = np.flatnonzero(self._ended)
-        motors[fresh] = 0.0
-        for group, crowd in zip(self._groups, self._crowds, strict=True):
-            crowd.drive(motors[group, 0], motors[group, 1])
-        self._tick += 1
-        self._steps += 1
-        if len(fresh):
-            self._begin(fresh)
-        seen = self._look()
-        senses, memory = self._readings, self._memory
+        motors, fresh = self._motors(np.asarray(actions)), self._ends > 0
+        self._episodes += fresh
+        self._steps = np.where(fresh, 0, self._steps + 1)
+        self._memory.forget(np.flatnonzero(fresh))
+        senses = self._place.drive(motors.T, self._ends)
+        seen, memory = self._look(senses), self._memory
         reward = self._reward.many(np.maximum(*memory.before), senses, memory.unchanged)
         terminated, truncated = np.asarray(lit(senses)), self._steps >= self._cap
         for column in (reward, terminated, truncated):
             column[fresh] = 0
-        self._ended = terminated | truncated
+        self._ends = np.where(terminated, REACHED, np.where(truncated, CAPPED, 0)).astype(np.uint8)
         return seen, reward, terminated, truncated, self._info()
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Leave the world; `close` calls it."""
+        self._place.close()
 
     def _motors(self, given: np.ndarray) -> np.ndarray:
         """The wheels' commands (N, 2) of a batch of actions."""
@@ -111,30 +112,15 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
             raise InvalidAction(f"{given!r} is not in {self.action_space}")
         return given.astype(float)
 
-    def _begin(self, rows: np.ndarray) -> None:
-        """Place robots at the start of their next episodes."""
-        self._episodes[rows] += 1
-        self._steps[rows] = 0
-        self._memory.forget(rows)
-        for row in rows.tolist():
-            self._crowds[row // TOGETHER].place(row % TOGETHER, self._placement(row))
-
-    def _placement(self, row: int) -> Pose:
-        """As `Simulation` has it: a function of (seed, episode)."""
-        return self._physics.random_pose(np.random.default_rng((self._seeds[row], int(self._episodes[row]))))
-
-    def _look(self) -> Any:
-        poses, front, rear = (
-            np.concatenate([getattr(crowd, name) for crowd in self._crowds]) for name in ("poses", "front", "rear")
-        )
-        self._poses = poses
-        self._readings = CrowdReadings(*self._suite(self._tick, poses), front, rear)
-        self._memory.see(self._readings)
-        seen = self._observe(self._readings, self._memory)
+    def _look(self, senses: CrowdReadings) -> Any:
+        self._readings = senses
+        self._memory.see(senses)
+        seen = self._observe(senses, self._memory)
         return np.asarray(seen, self.single_observation_space.dtype)
 
     def _info(self) -> dict[str, Any]:
-        return {"pose": self._poses, "episode_number": self._episodes.copy()}
+        poses = self._place.poses
+        return {**({} if poses is None else {"pose": poses}), "episode_number": self._episodes.copy()}
 
 
 class Memories:

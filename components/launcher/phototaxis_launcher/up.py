@@ -15,7 +15,7 @@ from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
 from phototaxis.errors import ComponentFailed, UserError
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import Launch, LaunchReply, Status, run_name
+from phototaxis.messages import MOST, Launch, LaunchReply, Status, run_name
 from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
@@ -42,6 +42,8 @@ class UpOptions(BusOptions, kw_only=True):
     """learning steps; 0: run until stopped"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """simulated seconds per second; 0: lockstep, as fast as it goes"""
+    robots: Annotated[int, Meta(ge=1, le=MOST)] = 1
+    """so many robots at once, each alone in its arena; one learner drives them all, the first is recorded"""
     swap: str = ""
     """TICK:LEARNER,…: at these ticks fresh agents take over; they inherit from one of their kind, and learn in the
     shadow of another"""
@@ -81,6 +83,7 @@ class Run:
         self.children = {
             "sim": self._child(
                 "sim", *bus, *common, f"--epochs={options.epochs}", f"--speed={options.speed}",
+                f"--robots={options.robots}",
                 f"--journal={self.folder / 'sim.journal'}",
             ),
             "sensors": self._child("sensors", *bus, *flags(fmus)),

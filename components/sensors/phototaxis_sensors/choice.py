@@ -17,6 +17,9 @@ from phototaxis_sensors.suite import Models, built_in
 class Choice(Protocol):
     """Makes the sensors of one robot, or of many."""
 
+    remembers: bool
+    """Whether many robots must all be in the same tick of their episodes."""
+
     def __call__(self, arena: Arena, scene: Scene) -> Models: ...
     def crowd(self, world: World, count: int) -> CrowdSuite:
         """The sensors of `count` robots."""
@@ -25,6 +28,8 @@ class Choice(Protocol):
 
 class BuiltInChoice:
     """The built-in models."""
+
+    remembers = False
 
     def __call__(self, arena: Arena, scene: Scene) -> Models:
         return built_in(arena, scene)

@@ -6,12 +6,25 @@ from typing import Any, NamedTuple
 
 from phototaxis.bus import Bus
 from phototaxis.chunks import Chunks
-from phototaxis.messages import Decoder, LogRequest, Readings, Refused, SensorsLog, SimLog, State
+from phototaxis.columns import unpack
+from phototaxis.messages import (
+    Decoder,
+    LogRequest,
+    Readings,
+    ReadingsOfMany,
+    Refused,
+    SensorsLog,
+    SimLog,
+    State,
+    StateOfMany,
+)
 from phototaxis.protocol import Once
 from phototaxis.topics import TOPICS
 
+from phototaxis_sensors.choice import Choice
+from phototaxis_sensors.many import SuiteOfMany
 from phototaxis_sensors.model import BuiltIn, Past
-from phototaxis_sensors.suite import Make, SensorSuite, built_in
+from phototaxis_sensors.suite import SensorSuite
 
 
 class Session(NamedTuple):
@@ -28,8 +41,9 @@ class Server:
     Models that remember (FMUs) are first led through what the simulation's log tells of the episode.
     """
 
-    def __init__(self, bus: Bus, make: Make = built_in):
+    def __init__(self, bus: Bus, make: Choice):
         self._bus, self._make = bus, make
+        self._many: tuple[str, Once[ReadingsOfMany]] | None = None
         self._models = (BuiltIn.name, BuiltIn.name)
         self._session: Session | None = None
         self._newest = -1
@@ -43,6 +57,8 @@ class Server:
                 self._log.poll(time.monotonic())
             elif event.topic == "state":
                 self._answer(event.message)
+            elif event.topic == "crowd/state":
+                self._answer_many(event.message)
             elif event.topic == "log/sensors":
                 self._log.answer(event)
             elif event.topic == "stop":
@@ -65,6 +81,29 @@ class Server:
                 self._log.flush()
                 self._models = models
             self._log.add((state.run, state.tick, readings.sonar, readings.light), time.monotonic())
+
+    def _answer_many(self, state: StateOfMany) -> None:
+        if self._many is None or self._many[0] != state.run:
+            world = self._bus.ask_one("world")
+            if world is None or world.run != state.run:
+                return None
+            self._log.flush()
+            self._newest = -1
+            self._many = state.run, Once(SuiteOfMany(world, self._make))
+        try:
+            readings = self._many[1](state)
+        except Refused as why:
+            return self._bus.refuse("crowd/state", str(why))
+        if readings is None:
+            return None
+        readings.driver = state.driver
+        self._bus.put("crowd/readings", readings)
+        if state.tick > self._newest:
+            self._newest = state.tick
+            robots = len(state.left) // 8
+            sonar, light = unpack(readings.sonar, robots, 16), unpack(readings.light, robots, 2)
+            self._log.add((state.run, state.tick, sonar[:, 0].tolist(), light[:, 0].tolist()), time.monotonic())
+        return None
 
     def _meet(self, state: State) -> Session | None:
         """The sensors of a run; None when its world is not to be had now (the state will come again)."""

@@ -7,8 +7,9 @@ from typing import Annotated
 from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
+from phototaxis.errors import UserError
 from phototaxis.journal import Journal
-from phototaxis.messages import run_name
+from phototaxis.messages import MOST, run_name
 from phototaxis.options import parse
 
 
@@ -27,20 +28,26 @@ class Options(ComponentOptions, kw_only=True):
     """name of the run (default: date, time and a few random letters)"""
     patience: Annotated[float, Meta(gt=0)] = 5.0
     """seconds after which a driver that is there but silent loses the seat, if somebody else waits for it"""
+    robots: Annotated[int, Meta(ge=1, le=MOST)] = 1
+    """so many robots at once, each alone in its arena, placed as with the seeds from `seed` on"""
     journal: str = ""
-    """file that lets a killed simulation continue its run"""
+    """file that lets a killed simulation continue its run (of one robot)"""
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis sim", "Run the world: physics, time and the seat.")
     from phototaxis_sim import arenas
+    from phototaxis_sim.many import SimulationOfMany
     from phototaxis_sim.pace import Pace
     from phototaxis_sim.server import Server
     from phototaxis_sim.simulation import Simulation
 
     arena = arenas.load(options.arena)
-    simulation = Simulation(arena, options.seed, options.run or run_name(), options.epochs)
-    journal = Journal(Path(options.journal)) if options.journal else None
+    setting = arena, options.seed, options.run or run_name(), options.epochs
+    simulation = SimulationOfMany(*setting, options.robots) if options.robots > 1 else Simulation(*setting)
+    if options.robots > 1 and options.restarted:
+        raise UserError("a simulation of many robots that died is not continued; start the run again")
+    journal = Journal(Path(options.journal)) if options.journal and options.robots == 1 else None
 
     def serve(bus: Bus) -> None:
         pace = Pace(arena.motion.control_period, options.speed)

@@ -9,9 +9,21 @@ import msgspec
 from phototaxis.bus import Bus, Event
 from phototaxis.chunks import Chunks
 from phototaxis.journal import Journal
-from phototaxis.messages import Command, Control, ControlReply, End, Phase, SimLog, State, Status, run_name
+from phototaxis.messages import (
+    Command,
+    CommandOfMany,
+    Control,
+    ControlReply,
+    Phase,
+    Refused,
+    SimLog,
+    State,
+    Status,
+    run_name,
+)
 from phototaxis.protocol import Question
 
+from phototaxis_sim.many import SimulationOfMany
 from phototaxis_sim.pace import Pace
 from phototaxis_sim.seat import Seat
 from phototaxis_sim.simulation import Simulation, Snapshot
@@ -24,12 +36,12 @@ HEIR_WITHIN = 3.0
 
 
 class Entry(msgspec.Struct, array_like=True):
-    """What the journal keeps of one tick."""
+    """What is applied at one tick, and what the journal keeps of it (of many robots: columns, and no journal)."""
 
-    left: float
-    right: float
+    left: Any
+    right: Any
     author: str
-    end: End
+    end: Any
 
 
 class Server:
@@ -41,14 +53,21 @@ class Server:
     """
 
     def __init__(
-        self, bus: Bus, simulation: Simulation, pace: Pace, journal: Journal | None = None, patience: float = 5.0
+        self,
+        bus: Bus,
+        simulation: Simulation | SimulationOfMany,
+        pace: Pace,
+        journal: Journal | None = None,
+        patience: float = 5.0,
     ):
-        self._bus, self._sim, self._pace, self._journal = bus, simulation, pace, journal
+        self._bus, self._pace, self._journal = bus, pace, journal
+        self._sim: Any = simulation
+        self._prefix = "crowd/" if simulation.world.robots > 1 else ""
         self._patience, self._logged = patience, ""
         self._heard_of, self._heard_at = "", 0.0
         self._question = Question()
         self._alive: set[str] = set()
-        self._held: Command | None = None
+        self._held: Command | CommandOfMany | None = None
         self._paused = self._stopping = self._finished = False
         self._steps_due = 0
         self._recent: deque[bool] = deque(maxlen=50)
@@ -90,7 +109,7 @@ class Server:
         return min(max(until, 0.0), 0.05)
 
     def _handle(self, event: Event) -> None:
-        if event.topic == "command":
+        if event.topic == f"{self._prefix}command":
             self._command(event.message)
         elif event.topic == "control":
             self._control(event)
@@ -123,7 +142,7 @@ class Server:
             self._seat.vacate(tick)
             self._ask()
 
-    def _command(self, command: Command) -> None:
+    def _command(self, command: Command | CommandOfMany) -> None:
         state = self._sim.state
         if command.run != state.run:
             return self._bus.refuse("command", f"another run: {command.run}")
@@ -131,6 +150,10 @@ class Server:
             return self._bus.refuse("command", f"late or repeated: for tick {command.tick}, at {state.tick}")
         if command.author != self._seat.driver or not command.author:
             return self._bus.refuse("command", f"not the driver: {command.author}")
+        try:
+            self._sim.check(command)
+        except Refused as why:
+            return self._bus.refuse("command", str(why))
         self._held = command
         now = self._heard_at = time.monotonic()
         if self._started is None:
@@ -146,7 +169,7 @@ class Server:
         if command is None or self._finished:
             return
         if self._sim.finished:
-            self._record(self._sim.state)
+            self._record(self._sim.watched)
             self._log.flush()
             self._announce(time.monotonic())  # the last mean rate
             self._finished = True
@@ -168,7 +191,7 @@ class Server:
     def _apply(self, entry: Entry) -> None:
         if self._journal is not None and not entry.end:
             self._journal.append(msgspec.msgpack.encode(entry))
-        before = self._sim.state
+        before = self._sim.watched
         self._advance(entry)
         if self._journal is not None and entry.end:
             self._journal.begin(self._header())
@@ -182,8 +205,7 @@ class Server:
     def _advance(self, entry: Entry) -> None:
         self._held = None
         self._sim.advance(entry.left, entry.right, entry.author, entry.end)
-        if self._sim.ended is not None:
-            self._recent.append(self._sim.ended.end == "reached")
+        self._recent.extend(self._sim.outcomes)
 
     def _ask(self) -> None:
         self._question.asked(time.monotonic())
@@ -191,7 +213,7 @@ class Server:
 
     def _publish(self) -> None:
         self._sim.state.driver = self._seat.driver
-        self._bus.put("state", self._sim.state)
+        self._bus.put(f"{self._prefix}state", self._sim.state)
 
     def _control(self, event: Event) -> None:
         request: Control | None = event.message
@@ -234,8 +256,7 @@ class Server:
     def _begin(self, seed: int) -> None:
         """A new run in the same arena, under a name of its own."""
         self._log.flush()
-        world = self._sim.world
-        self._sim = Simulation(world.arena, seed, run_name(), world.epochs)
+        self._sim = self._sim.anew(seed, run_name())
         self._held, self._started, self._finished = None, None, False
         self._recent.clear()
         self._ended.clear()
@@ -279,7 +300,7 @@ class Server:
         state = sim.state
         return Status(
             run=sim.world.run, phase=phase, waiting_for=whom, waited=waited, speed=self._pace.speed,
-            tick=state.tick, epoch=state.epoch, epochs=sim.world.epochs, episode=state.episode,
+            tick=state.tick, epoch=state.epoch, epochs=sim.world.epochs, episode=sim.watched.episode,
             episodes=sim.episodes, reached=sim.reached,
             recent=sum(self._recent) / len(self._recent) if self._recent else 0.0,
             rate=self._rate, mean_rate=self._mean_rate, driver=self._seat.driver, drivers=self._seat.history,

@@ -6,7 +6,7 @@ import struct
 import numpy as np
 from msgspec import Struct
 from phototaxis.arena import Arena
-from phototaxis.messages import End, Episode, State, World
+from phototaxis.messages import Command, End, Episode, State, World
 
 from phototaxis_sim.physics import Motion, Physics, Pose
 
@@ -61,6 +61,23 @@ class Simulation:
     def finished(self) -> bool:
         """Whether the last epoch has been made; its state is still to be answered."""
         return 0 < self.world.epochs <= self._epoch
+
+    @property
+    def outcomes(self) -> list[bool]:
+        """Whether the light was reached, for each episode that ended in the last `advance`."""
+        return [] if self.ended is None else [self.ended.end == "reached"]
+
+    def check(self, command: Command) -> None:
+        """Nothing is wrong with a command that has been decoded."""
+
+    @property
+    def watched(self) -> State:
+        """What people watch."""
+        return self.state
+
+    def anew(self, seed: int, run: str) -> "Simulation":
+        """Another run in the same arena."""
+        return Simulation(self.world.arena, seed, run, self.world.epochs)
 
     def advance(self, left: float, right: float, author: str, end: End = "") -> State:
         """Hold a command for one control period, or end the episode; the next state."""

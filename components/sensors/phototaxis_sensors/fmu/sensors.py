@@ -45,6 +45,8 @@ class FmuSensors:
         when an FMU cannot be used, or an option does not fit it.
     """
 
+    remembers = True
+
     def __init__(self, options: FmuOptions, one_cpu: bool = False):
         self._options, self._one_cpu = options, one_cpu
         files = {"light": options.light_fmu, "sonar": options.sonar_fmu}

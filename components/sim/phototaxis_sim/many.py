@@ -1,0 +1,134 @@
+"""A run of many robots: the ticks, episodes and epochs of `Simulation` for N robots, each alone in its arena."""
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+from phototaxis.arena import Arena
+from phototaxis.columns import COUNT, FLAG, pack, unpack
+from phototaxis.messages import ENDS, CommandOfMany, Refused, State, StateOfMany, World
+
+from phototaxis_sim.crowd import Crowd
+from phototaxis_sim.physics import Physics, Pose
+
+TOGETHER = 256
+"""Robots that share a pymunk space: they overlap without touching, which its index pays for."""
+
+
+class SimulationOfMany:
+    """N robots from tick to tick.
+
+    Robot i is placed as in a run with the seed `seeds[i]`: seed + i unless other seeds are given.
+
+    Attributes
+    ----------
+    poses : (N, 3) x and y in m, heading in rad.
+    front, rear : (N,) bool, contacts of the last control period.
+    episode : (N,) count of each robot's episodes.
+    outcomes : whether the light was reached, for each episode that ended in the last `advance`.
+    """
+
+    ended = None
+
+    def __init__(
+        self, arena: Arena, seed: int, run: str, epochs: int = 0, robots: int = 1, seeds: Sequence[int] | None = None
+    ):
+        self.world = World(run, arena, seed, epochs, robots)
+        self._seeds = [seed + row for row in range(robots)] if seeds is None else list(seeds)
+        self._physics = Physics(arena)
+        self.episode, self.tick, self.epoch = np.zeros(robots, int), 0, 0
+        self.episodes = self.reached = 0
+        self.outcomes: list[bool] = []
+        starts = [self._placement(row) for row in range(robots)]
+        self._groups = [slice(start, start + TOGETHER) for start in range(0, robots, TOGETHER)]
+        self._crowds = [Crowd(arena, starts[group]) for group in self._groups]
+        self._chain = b"\0" * 8
+        self._report(np.zeros(robots), np.zeros(robots), "")
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last epoch has been made."""
+        return 0 < self.world.epochs <= self.epoch
+
+    def anew(self, seed: int, run: str) -> "SimulationOfMany":
+        """Another run in the same arena."""
+        return SimulationOfMany(self.world.arena, seed, run, self.world.epochs, self.world.robots)
+
+    def advance(self, left: bytes | float, right: bytes | float, author: str, end: bytes | str = b"") -> StateOfMany:
+        """Hold the commands for one control period; robots whose episode ends are placed anew instead.
+
+        Columns as in `CommandOfMany`; one number is for all, and so is one of the words for an end.
+
+        Raises
+        ------
+        Refused
+            when a column is not of this many robots, or a command is out of range.
+        """
+        motors, ends = self._columns(left, right, end)
+        return self.drive(motors, ends, author)
+
+    def check(self, command: CommandOfMany) -> None:
+        """Raise Refused when a column is not of this many robots, or a command is out of range."""
+        self._columns(command.left, command.right, command.end)
+
+    def _columns(self, left: bytes | float, right: bytes | float, end: bytes | str) -> tuple[np.ndarray, np.ndarray]:
+        """Motors (2, N) and ends (N,)."""
+        robots = self.world.robots
+        motors = np.stack([self._column(left), self._column(right)])
+        ends = np.full(robots, ENDS.index(end), FLAG) if isinstance(end, str) else unpack(end, robots, kind=FLAG)
+        if (np.abs(motors) > 1).any() or (ends >= len(ENDS)).any():
+            raise Refused("value: a command out of range")
+        return motors, ends
+
+    def drive(self, motors: np.ndarray, ends: np.ndarray, author: str) -> StateOfMany:
+        """The same with arrays: motors (2, N), ends (N,)."""
+        over = np.flatnonzero(ends)
+        motors = np.where(ends > 0, 0.0, motors)
+        for group, crowd in zip(self._groups, self._crowds, strict=True):
+            crowd.drive(motors[0, group], motors[1, group])
+        self.tick += 1
+        self.epoch += self.world.robots - len(over)
+        self.outcomes = (ends[over] == ENDS.index("reached")).tolist()
+        self.episodes += len(over)
+        self.reached += sum(self.outcomes)
+        self.episode[over] += 1
+        for row in over.tolist():
+            self._crowds[row // TOGETHER].place(row % TOGETHER, self._placement(row))
+        return self._report(motors[0], motors[1], author)
+
+    @property
+    def watched(self) -> State:
+        """The first robot, for people to watch."""
+        state, (x, y, heading) = self.state, self.poses[0].tolist()
+        return State(
+            state.run, state.tick, int(self.episode[0]), state.epoch, state.time, x, y, heading, 0.0, 0.0,
+            bool(self.front[0]), bool(self.rear[0]), float(self._motors[0][0]), float(self._motors[1][0]),
+            state.author, state.driver, state.hash,
+        )  # fmt: skip
+
+    def _column(self, given: bytes | float) -> np.ndarray:
+        robots = self.world.robots
+        return unpack(given, robots) if isinstance(given, bytes) else np.full(robots, float(given))
+
+    def _placement(self, row: int) -> Pose:
+        """As `Simulation` has it: a function of (seed, episode)."""
+        return self._physics.random_pose(np.random.default_rng((self._seeds[row], int(self.episode[row]))))
+
+    def _report(self, left: np.ndarray, right: np.ndarray, author: str) -> StateOfMany:
+        self.poses, self.front, self.rear = (
+            np.concatenate([getattr(crowd, name) for crowd in self._crowds]) for name in ("poses", "front", "rear")
+        )
+        self._motors = left, right
+        columns = (
+            pack(self.episode, COUNT), pack(self.poses.T), pack(np.stack([self.front, self.rear]), FLAG),
+            pack(left), pack(right),
+        )  # fmt: skip
+        digest = hashlib.blake2b(self._chain, digest_size=8)
+        for column in (pack(np.array([self.tick, self.epoch]), COUNT), *columns):
+            digest.update(column)
+        self._chain = digest.digest()
+        seconds = self.tick * self.world.arena.motion.control_period
+        self.state = StateOfMany(
+            self.world.run, self.tick, self.epoch, seconds, *columns, author, "", digest.hexdigest()
+        )
+        return self.state
