@@ -76,7 +76,7 @@ class ManyHere:
         return self._sense()
 
     def drive(self, motors: np.ndarray, ends: np.ndarray) -> CrowdReadings:
-        self._simulation.drive(motors, ends, "gymnasium")
+        self._simulation.drive(motors, ends)
         return self._sense()
 
     def close(self) -> None:

@@ -25,6 +25,7 @@ class SimulationOfMany:
     poses : (N, 3) x and y in m, heading in rad.
     front, rear : (N,) bool, contacts of the last control period.
     episode : (N,) count of each robot's episodes.
+    state : the present tick as it is published, after `advance`; `driver` is filled in by whoever keeps the seat.
     outcomes : whether the light was reached, for each episode that ended in the last `advance`.
     """
 
@@ -43,7 +44,9 @@ class SimulationOfMany:
         self._groups = [slice(start, start + TOGETHER) for start in range(0, robots, TOGETHER)]
         self._crowds = [Crowd(arena, starts[group]) for group in self._groups]
         self._chain = b"\0" * 8
-        self._report(np.zeros(robots), np.zeros(robots), "")
+        self._motors = np.zeros((2, robots))
+        self._look()
+        self._report("")
 
     @property
     def finished(self) -> bool:
@@ -64,8 +67,8 @@ class SimulationOfMany:
         Refused
             when a column is not of this many robots, or a command is out of range.
         """
-        motors, ends = self._columns(left, right, end)
-        return self.drive(motors, ends, author)
+        self.drive(*self._columns(left, right, end))
+        return self._report(author)
 
     def check(self, command: CommandOfMany) -> None:
         """Raise Refused when a column is not of this many robots, or a command is out of range."""
@@ -80,10 +83,10 @@ class SimulationOfMany:
             raise Refused("value: a command out of range")
         return motors, ends
 
-    def drive(self, motors: np.ndarray, ends: np.ndarray, author: str) -> StateOfMany:
-        """The same with arrays: motors (2, N), ends (N,)."""
+    def drive(self, motors: np.ndarray, ends: np.ndarray) -> None:
+        """The same with arrays, motors (2, N) and ends (N,), and without a new `state`."""
         over = np.flatnonzero(ends)
-        motors = np.where(ends > 0, 0.0, motors)
+        motors = self._motors = np.where(ends > 0, 0.0, motors)
         for group, crowd in zip(self._groups, self._crowds, strict=True):
             crowd.drive(motors[0, group], motors[1, group])
         self.tick += 1
@@ -94,7 +97,7 @@ class SimulationOfMany:
         self.episode[over] += 1
         for row in over.tolist():
             self._crowds[row // TOGETHER].place(row % TOGETHER, self._placement(row))
-        return self._report(motors[0], motors[1], author)
+        self._look()
 
     @property
     def watched(self) -> State:
@@ -114,11 +117,13 @@ class SimulationOfMany:
         """As `Simulation` has it: a function of (seed, episode)."""
         return self._physics.random_pose(np.random.default_rng((self._seeds[row], int(self.episode[row]))))
 
-    def _report(self, left: np.ndarray, right: np.ndarray, author: str) -> StateOfMany:
+    def _look(self) -> None:
         self.poses, self.front, self.rear = (
             np.concatenate([getattr(crowd, name) for crowd in self._crowds]) for name in ("poses", "front", "rear")
         )
-        self._motors = left, right
+
+    def _report(self, author: str) -> StateOfMany:
+        left, right = self._motors
         columns = (
             pack(self.episode, COUNT), pack(self.poses.T), pack(np.stack([self.front, self.rear]), FLAG),
             pack(left), pack(right),
