@@ -63,6 +63,7 @@ class Agent:
         self.task, self.exploration, self.budget = task, exploration, budget
         self.percept = PERCEPTS[task.percept]
         self.learning = learning
+        self.alone = True
         self.epoch = 0
         self.last = Step(0, -1, 0.0, 0.0, 0.0)
         self._options = kind.Options() if options is None else options
@@ -101,7 +102,7 @@ class Agent:
             state += self.learner.remember(before, applied, max(readings.light) - max(memory.before))
             if self.learning and applied >= 0:
                 progress = min(self.epoch / self.budget, 1.0)
-                first, self._linked = not self._linked, True
+                first, self._linked = not (self._linked and self.alone), True
                 error = self.learner.learn(Transition(before, applied, reward, state, done, progress, first))
                 self.epoch += 1
             else:

@@ -18,13 +18,17 @@ from phototaxis.messages import (
     CheckpointReply,
     CheckpointRequest,
     Command,
+    CommandOfMany,
     Control,
     Readings,
+    ReadingsOfMany,
+    Refused,
     World,
 )
 from phototaxis.protocol import Once
 
 from phototaxis_agent.agent import Agent
+from phototaxis_agent.many import Flock
 
 TABLE_EVERY = 0.5
 SAVE_EVERY = 10.0
@@ -42,7 +46,7 @@ class Session:
 
     world: World
     agent: Agent
-    answer: Once[Command]
+    answer: Once[Any]
 
 
 class Server:
@@ -98,7 +102,7 @@ class Server:
         """Do what one event asks for; False when it is to stop."""
         if event is None:
             self._log.poll(time.monotonic())
-        elif event.topic == "readings":
+        elif event.topic in ("readings", "crowd/readings"):
             self._readings(event.message)
         elif event.topic == "log/agent":
             self._log.answer(event)
@@ -108,7 +112,7 @@ class Server:
             self._enlisted = False  # a simulation that is back knows nothing of who waits for its seat
         return event is None or event.topic != "stop"
 
-    def _readings(self, readings: Readings) -> None:
+    def _readings(self, readings: Readings | ReadingsOfMany) -> None:
         session = self._meet(readings.run)
         if session is None:
             return
@@ -124,9 +128,10 @@ class Server:
         elif self._seated and readings.driver and readings.author == readings.driver:
             self._replaced = self._mode != "stand by"
         self._seek(readings)
-        self._follow(session, readings)
+        if isinstance(readings, Readings):
+            self._follow(session, readings)
 
-    def _seek(self, readings: Readings) -> None:
+    def _seek(self, readings: Readings | ReadingsOfMany) -> None:
         """Ask for the seat, as the mode says."""
         now = time.monotonic()
         if now < self._claim_at:
@@ -155,7 +160,7 @@ class Server:
         elif self._leader and not self._related:
             self._answer(session, readings)
 
-    def _sit(self, session: Session, readings: Readings) -> None:
+    def _sit(self, session: Session, readings: Readings | ReadingsOfMany) -> None:
         """Begin to drive, with what the predecessor knows if it is of the same kind."""
         if self._predecessor and not self._in_step and self._mode != "claim":
             self._leader = self._predecessor
@@ -199,7 +204,7 @@ class Server:
             reply.data = encode(*session.agent.checkpoint())
         event.reply(reply)
 
-    def _drive(self, session: Session, readings: Readings) -> None:
+    def _drive(self, session: Session, readings: Readings | ReadingsOfMany) -> None:
         """Answer one tick: first to the journal, then to the learner, then to the bus."""
         agent = session.agent
         fresh = (readings.run, readings.tick) != agent.tick
@@ -208,16 +213,20 @@ class Server:
             return
         if 0 < session.world.epochs <= readings.epoch:
             self._save(agent)  # before the last answer: who sees the run finished finds the checkpoint
-        self._bus.put("command", command)
+        self._bus.put("command" if isinstance(readings, Readings) else "crowd/command", command)
         if fresh:
             self._record(agent)
 
-    def _answer(self, session: Session, readings: Readings) -> Command | None:
-        """The command for one tick, whether it will count or not."""
+    def _answer(self, session: Session, readings: Readings | ReadingsOfMany) -> Command | CommandOfMany | None:
+        """The command for one tick, whether it will count or not. Of many robots no journal is kept."""
         agent = session.agent
-        if self._journal is not None and (readings.run, readings.tick) != agent.tick:
-            self._journal.append(msgspec.msgpack.encode(readings))
-        command = session.answer(readings)
+        journal = self._journal if isinstance(readings, Readings) else None
+        if journal is not None and (readings.run, readings.tick) != agent.tick:
+            journal.append(msgspec.msgpack.encode(readings))
+        try:
+            command = session.answer(readings)
+        except Refused as why:
+            return self._bus.refuse("crowd/readings", str(why))
         if time.monotonic() >= self._save_at:
             self._save(agent)
         return command
@@ -237,7 +246,11 @@ class Server:
                 agent.restore(*load(self._resume), source=str(self._resume))
         else:
             agent = self._session.agent
-        self._session = Session(world, agent, Once(agent, agent.tick, agent.command))
+        if world.robots > 1:
+            answer: Once[Any] = Once(Flock(agent, world.robots))
+        else:
+            answer = Once(agent, agent.tick, agent.command)
+        self._session = Session(world, agent, answer)
         self._driving = self._seated = self._enlisted = self._related = self._in_step = False
         self._leader = self._predecessor = ""
         self._replay(self._session)

@@ -62,8 +62,10 @@ class Sensors:
 
 def _rows(variables: tuple[Any, ...]) -> np.ndarray:
     """(variables,) of numbers, or (N, variables) of arrays."""
-    many = max((np.shape(one) for one in variables), key=len)
-    return np.stack([np.broadcast_to(one, many) for one in variables], axis=-1).astype(np.float32)
+    rows = np.empty((*max((np.shape(one) for one in variables), key=len), len(variables)), np.float32)
+    for place, variable in enumerate(variables):
+        rows[..., place] = variable
+    return rows
 
 
 def observation(percept: str, arena: Arena) -> Observation:
