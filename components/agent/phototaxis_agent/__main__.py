@@ -1,8 +1,9 @@
 """`phototaxis agent`: a learner as a process."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from msgspec import Meta
 from phototaxis.bus import Bus
@@ -30,8 +31,37 @@ class Options(ComponentOptions, kw_only=True):
     """with --take-over: not before this tick"""
     standby: bool = False
     """drive when the driver vanishes; until then keep in step with it, or learn from what it does"""
+    policy: str = ""
+    """a frozen policy in the place of a learner: a file (.zip) that Stable-Baselines3 has saved"""
+    trust: bool = False
+    """load the policy although such a file can run any code: you trust who made it"""
     agent_seed: Annotated[int, Meta(ge=0)] | None = None
     """seed of the learner and its exploration (default: the run's)"""
+
+
+POLICIES = "phototaxis.policies"
+
+
+def policy_loader(file: Path, trusted: bool) -> Callable[[World, int], Any]:
+    """Makes the agent for a policy file, by the entry point that is called as its suffix.
+
+    Raises
+    ------
+    UserError
+        when there is none, what it needs is not installed, or the file cannot be loaded.
+    """
+    points = {point.name: point for point in entry_points(group=POLICIES)}
+    point = points.get(file.suffix.removeprefix("."))
+    if point is None:
+        raise UserError(f"--policy {file}: no policies of the kind '{file.suffix}'; there are: .{', .'.join(points)}")
+    try:
+        kind = point.load()
+    except ModuleNotFoundError as error:
+        line = (
+            f"--policy needs the package {error.name}; install it with: pip install 'phototaxis[gym]' stable-baselines3"
+        )
+        raise UserError(line) from None
+    return kind(file, trusted)
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -45,15 +75,19 @@ def main(argv: Sequence[str] | None = None) -> None:
         raise UserError("--take-over and --standby exclude each other")
     mode: Mode = "take over" if options.take_over else "stand by" if options.standby else "claim"
 
+    if options.policy and (options.checkpoint or options.resume):
+        raise UserError("--policy learns nothing: leave --checkpoint and --resume out")
+    load = policy_loader(Path(options.policy), options.trust) if options.policy else None
+
     def make(world: World) -> Agent:
-        return setup.agent(world, seed=options.agent_seed)
+        return load(world, setup.task.cap) if load else setup.agent(world, seed=options.agent_seed)
 
     def serve(bus: Bus) -> None:
         path = kept / f"{bus.name}.npz" if kept is not None and worlds else kept
         resume = Path(options.resume) if options.resume else path if options.restarted else None
         Server(bus, make, path, resume, bool(options.resume), mode, options.at).serve()
 
-    run("agent", options, serve, setup.learner, worlds)
+    run("agent", options, serve, "policy" if options.policy else setup.learner, worlds)
 
 
 if __name__ == "__main__":

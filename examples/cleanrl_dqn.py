@@ -1,0 +1,118 @@
+"""A deep Q-network in one file, in the manner of CleanRL: sixteen robots at once, in this process or behind the bus.
+
+python examples/cleanrl_dqn.py --steps 30000
+phototaxis sim --robots 16 & phototaxis sensors &
+python examples/cleanrl_dqn.py --steps 30000 --connect local
+"""
+
+import argparse
+import random
+from dataclasses import dataclass, fields
+
+import gymnasium
+import numpy as np
+import torch
+from torch import nn
+
+NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
+
+
+@dataclass
+class Options:
+    """Hyperparameters."""
+
+    seed: int = 0
+    """of everything"""
+    steps: int = 30_000
+    """robot steps in all"""
+    robots: int = 16
+    """robots that gather experience together"""
+    connect: str = ""
+    """local, or tcp/HOST:7447: a running system with so many robots"""
+    world: str = "phototaxis"
+    """its name"""
+    gamma: float = 0.6
+    """discount"""
+    rate: float = 1e-3
+    """learning rate of Adam"""
+    batch: int = 128
+    """transitions in one update"""
+    start: int = 500
+    """robot steps before the first update"""
+    target: int = 100
+    """updates between copies of the net to the target net"""
+    explore: float = 0.4
+    """share of the steps in which the share of random actions falls from 1 to `last`"""
+    last: float = 0.05
+    """share of random actions in the end"""
+
+
+def network(inputs: int, actions: int) -> nn.Module:
+    return nn.Sequential(nn.Linear(inputs, 64), nn.ReLU(), nn.Linear(64, 64), nn.ReLU(), nn.Linear(64, actions))
+
+
+def success(net: nn.Module, placements: int = 200, seed: int = 1_000_000) -> float:
+    """Share of fresh placements from which the light is reached within 300 steps."""
+    robots = gymnasium.make_vec(NAME, num_envs=placements, percept="continuous", cap=300)
+    seen, _ = robots.reset(seed=seed)
+    reached, over = np.zeros(placements, bool), np.zeros(placements, bool)
+    while not over.all():
+        seen, _, terminated, truncated, _ = robots.step(net(torch.tensor(seen)).argmax(1).numpy())
+        reached |= terminated & ~over
+        over |= terminated | truncated
+    return float(reached.mean())
+
+
+def train(options: Options) -> nn.Module:
+    random.seed(options.seed)
+    torch.manual_seed(options.seed)
+    rng = np.random.default_rng(options.seed)
+    where = {"connect": options.connect, "world": options.world} if options.connect else {}
+    robots = gymnasium.make_vec(NAME, num_envs=options.robots, percept="continuous", cap=100, **where)
+    inputs, actions = robots.single_observation_space.shape[0], robots.single_action_space.n
+    net, target = network(inputs, actions), network(inputs, actions)
+    target.load_state_dict(net.state_dict())
+    adam = torch.optim.Adam(net.parameters(), options.rate)
+    memory: list[tuple] = []
+    seen, _ = robots.reset(seed=options.seed)
+    over, updates = np.zeros(options.robots, bool), 0
+    for step in range(0, options.steps, options.robots):
+        used = min(step / (options.explore * options.steps), 1.0)
+        with torch.no_grad():
+            action = net(torch.tensor(seen)).argmax(1).numpy()
+        dice = rng.random(options.robots) < 1 + used * (options.last - 1)
+        action = np.where(dice, rng.integers(actions, size=options.robots), action)
+        following, reward, terminated, truncated, _ = robots.step(action)
+        for row in np.flatnonzero(~over):  # a robot that has been placed anew has not acted
+            memory.append((seen[row], action[row], reward[row], following[row], float(terminated[row])))
+        seen, over = following, terminated | truncated
+        if len(memory) < options.start:
+            continue
+        for _ in range(2):
+            columns = zip(*random.sample(memory, options.batch), strict=True)
+            s, a, r, n, t = (torch.tensor(np.array(column)) for column in columns)
+            with torch.no_grad():
+                best = net(n).argmax(1, keepdim=True)
+                wanted = r.float() + options.gamma * (1 - t.float()) * target(n).gather(1, best).squeeze(1)
+            loss = nn.functional.smooth_l1_loss(net(s).gather(1, a[:, None]).squeeze(1), wanted)
+            adam.zero_grad()
+            loss.backward()
+            adam.step()
+            updates += 1
+            if updates % options.target == 0:
+                target.load_state_dict(net.state_dict())
+    robots.close()
+    return net
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    for one in fields(Options):
+        parser.add_argument(f"--{one.name}", type=one.type, default=one.default)
+    options = Options(**vars(parser.parse_args()))
+    net = train(options)
+    print(f"{options.steps} steps, seed {options.seed}: {success(net):.1%} of 200 fresh placements")
+
+
+if __name__ == "__main__":
+    main()
