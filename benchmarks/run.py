@@ -16,8 +16,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import environments
 import fmu
-import gymnasium
 import handover
 import msgspec
 import numpy as np
@@ -85,10 +85,7 @@ def main() -> None:
     for count, rate in crowds(paper):
         print(f"  {count:5} robots {rate:12,.0f}")
 
-    print("\nGymnasium, observation of all sensors, robot steps/s: single environment, then vector ones")
-    print(f"  {'single':>12} {gymnasium_single():12,.0f}")
-    for count in (1, 16, 256, 4096):
-        print(f"  {count:5} robots {gymnasium_many(count):12,.0f}")
+    environments.report()
 
     print("\nSensor models from FMUs")
     fmu.report(paper)
@@ -161,34 +158,6 @@ def with_obstacles(arena: Arena, count: int) -> Arena:
 def in_process(arena: Arena) -> float:
     """Epochs/s of the loop in one process: physics, 16 sonars, lights, Q-table."""
     return EPOCHS / train(SETUP, arena, 1, EPOCHS)[1]
-
-
-ENVIRONMENT = "phototaxis_gym:phototaxis/LightSeeker-v0"
-
-
-def gymnasium_single(steps: int = 5000) -> float:
-    """Steps/s of one environment under random actions, resets included."""
-    environment = gymnasium.make(ENVIRONMENT, percept="sensors")
-    environment.reset(seed=0)
-    actions = np.random.default_rng(0).integers(9, size=steps)
-    began = time.perf_counter()
-    for action in actions:
-        _, _, terminated, truncated, _ = environment.step(action)
-        if terminated or truncated:
-            environment.reset()
-    return steps / (time.perf_counter() - began)
-
-
-def gymnasium_many(count: int, steps: int = 50_000) -> float:
-    """Robot steps/s of a vector environment under random actions, resets included."""
-    robots = gymnasium.make_vec(ENVIRONMENT, num_envs=count, percept="sensors")
-    robots.reset(seed=0)
-    turns = max(steps // count, 30)
-    actions = np.random.default_rng(0).integers(9, size=(turns, count))
-    began = time.perf_counter()
-    for action in actions:
-        robots.step(action)
-    return turns * count / (time.perf_counter() - began)
 
 
 def ring() -> float:

@@ -1,0 +1,119 @@
+"""Many robots in one world, over the bus: as in one process, one learner for all, bad columns do no harm."""
+
+import os
+import signal
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from fmus import Built
+from gymnasium.error import Error, InvalidAction
+from phototaxis.bus import Bus
+from phototaxis.columns import FLAG, pack
+from phototaxis.messages import CommandOfMany, Control
+from phototaxis.session import BusOptions, open_session
+from rerun_files import series
+from support import children, observer, phototaxis, result, wait, wait_status
+
+NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
+
+
+@pytest.fixture
+def system(start, world):
+    """Starts a simulation of N robots and their sensors."""
+
+    def begin(robots: int, *words: object) -> dict:
+        started = {
+            "sim": start("sim", "--name", world, "--robots", robots, *words),
+            "sensors": start("sensors", "--name", world),
+        }
+        with observer(world) as bus:
+            wait_status(bus, lambda status: any(who.startswith("sensors/") for who in status.alive), *started.values())
+        return started
+
+    return begin
+
+
+@pytest.mark.parametrize("robots", [5, 300])
+def test_the_vector_environment_is_the_same_here_and_there(system, world, robots):
+    system(robots)
+    here = gymnasium.make_vec(NAME, num_envs=robots, percept="sensors", cap=30)
+    there: Any = gymnasium.make_vec(NAME, num_envs=robots, percept="sensors", cap=30, connect="local", world=world)
+    rng, ends = np.random.default_rng(0), 0
+    for seed in (3, 4):
+        np.testing.assert_array_equal(here.reset(seed=seed)[0], there.reset(seed=seed)[0])
+        for _ in range(100):
+            actions = rng.integers(9, size=robots)
+            one, other = here.step(actions), there.step(actions)
+            for ours, theirs in zip(one[:4], other[:4], strict=True):
+                np.testing.assert_array_equal(ours, theirs)
+            np.testing.assert_array_equal(one[4]["episode_number"], other[4]["episode_number"])
+            ends += int((one[2] | one[3]).sum())
+    assert ends > 2 * robots
+    with pytest.raises(InvalidAction):
+        there.step(np.full(robots, 9))
+    with pytest.raises(Error, match="give reset one number"):
+        there.reset(seed=list(range(0, 2 * robots, 2)))
+    there.close()
+
+
+def test_one_learner_drives_them_all_and_killed_sensors_change_nothing(up, world):
+    words = "--robots", 16, "--epochs", 8000, "--seed", 3, "--learner", "qtable"
+    whole = result(up(*words))
+    assert whole["finished"]
+    assert 8000 <= whole["epochs"] < 8016
+    assert whole["ticks"] < 700, "sixteen robots learn in each"
+    ticks = list(range(whole["ticks"] + 1))
+    assert sorted(series(whole["recording"], "/world/trail", "Points2D:positions")) == ticks, "the first is recorded"
+    assert sorted(series(whole["recording"], "/plots/reward", "Scalars:scalars")) == ticks
+    launcher = up(*words, "--no-recorder")
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.tick > 200, launcher)
+        os.kill(children(launcher.popen.pid)["sensors"], signal.SIGKILL)
+    found = result(launcher)
+    assert found["restarts"] == {"sensors": 1}
+    assert (found["state_hash"], found["learner_hash"]) == (whole["state_hash"], whole["learner_hash"])
+    measured = phototaxis("evaluate", whole["checkpoint"], "--placements", 100, "--json")
+    assert measured.returncode == 0, measured.stderr
+
+
+def test_a_killed_simulation_of_many_ends_the_run(up, world):
+    launcher = up("--robots", 4, "--epochs", 0, "--no-recorder")
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.tick > 50, launcher)
+        os.kill(children(launcher.popen.pid)["sim"], signal.SIGKILL)
+    assert launcher.end() == 2
+    assert "a simulation of many robots that died is not continued" in launcher.stderr
+
+
+def test_columns_of_the_wrong_size_are_refused_and_the_run_goes_on(system, world):
+    sim = system(3)["sim"]
+    options = BusOptions(name=world)
+    with open_session("agent", options, "raw") as session, Bus(session, world, "agent", "raw") as bus:
+        assert bus.wait_for("sim", 20)
+        assert bus.control(Control("claim", "raw"), timeout=10)
+        now = wait(bus, lambda event: event.topic == "crowd/readings" and event.message.driver == "raw", sim).message
+        good, none = pack(np.zeros(3)), pack(np.zeros(3), FLAG)
+        for left, end in (
+            (good[:-1], none), (good + good, none), (pack(np.full(3, np.nan)), none),
+            (pack(np.full(3, 1.5)), none), (good, pack(np.full(3, 9), FLAG)), (good, b""),
+        ):  # fmt: skip
+            bus.put("crowd/command", CommandOfMany(now.run, now.tick, "raw", left, good, end))
+        with observer(world) as watch:
+            status = wait_status(watch, lambda status: sum(status.refused.values()) == 6, sim)
+        assert status.tick == now.tick
+        bus.put("crowd/command", CommandOfMany(now.run, now.tick, "raw", good, good, none))
+        wait(bus, lambda event: event.topic == "crowd/readings" and event.message.tick == now.tick + 1, sim)
+
+
+def test_what_is_for_one_robot_says_so(system, world, start, fmu: Built):
+    system(3)
+    with pytest.raises(Error, match=r"has 3 robots: gymnasium\.make_vec drives them"):
+        gymnasium.make(NAME, connect="local", world=world)
+    with pytest.raises(Error, match="has 3 robots, num_envs is 4; start it with --robots 4"):
+        gymnasium.make_vec(NAME, num_envs=4, connect="local", world=world)
+    foreign = start("sensors", "--name", f"{world}b", "--light-fmu", fmu("lag", 3))
+    start("sim", "--name", f"{world}b", "--robots", 2)
+    assert foreign.end() == 2
+    assert "an FMU senses for one robot; this world has 2" in foreign.stderr
