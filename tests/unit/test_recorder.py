@@ -45,6 +45,19 @@ def test_colours_tell_near_from_far_and_good_from_bad():
 def test_each_state_has_its_place_in_the_picture_of_the_policy(name: str):
     places = policy.cells(PERCEPTS[name].sizes)
     assert len({tuple(place) for place in places.tolist()}) == len(places) == np.prod(PERCEPTS[name].sizes)
+    assert (places > 0).all()
+    assert (places < (policy.WIDTH, policy.HEIGHT)).all()
+
+
+def test_the_policy_shows_where_it_moves_stands_and_knows_nothing():
+    percept = PERCEPTS["simple"]
+    table, visits = np.zeros((24, 9)), np.zeros(24, int)
+    table[5, ACTIONS.index((1.0, 1.0))], visits[5], visits[6] = 1.0, 3, 1
+    moving, still = policy.arrows(percept, table, visits)
+    assert moving.vectors is not None
+    assert still.positions is not None
+    assert len(moving.vectors.as_arrow_array()) == 1
+    assert len(still.positions.as_arrow_array()) == 23
 
 
 def test_the_arrow_points_where_the_action_drives():

@@ -6,6 +6,7 @@ from phototaxis.arena import Arena
 
 from phototaxis_recorder.colors import BLUE, INK, ORANGE, RED, STONE, YELLOW, of_light
 from phototaxis_recorder.field import light_field
+from phototaxis_recorder.policy import HEIGHT, WIDTH, frame
 
 TRAIL = 300
 """Ticks of trail that are shown behind the robot."""
@@ -63,7 +64,10 @@ def blueprint(arena: Arena, epochs: int) -> rrb.Blueprint:
             rrb.Vertical(
                 rrb.BarChartView(origin="/learner/current", name="Q of the nine actions, here and now"),
                 rrb.Spatial2DView(
-                    origin="/learner/policy", name="Policy: best motion in each state", background=[250, 250, 248]
+                    origin="/learner/policy",
+                    name="Policy: best motion in each state",
+                    background=[250, 250, 248],
+                    visual_bounds=rrb.VisualBounds2D(x_range=[-0.1, WIDTH + 0.1], y_range=[-0.1, HEIGHT + 0.1]),
                 ),
                 rrb.TensorView(origin="/learner/table", name="Q(state, action)", view_fit="fill"),
                 rrb.BarChartView(origin="/learner/visits", name="Visits of each state"),
@@ -108,6 +112,7 @@ def draw_world(recording: rr.RecordingStream, arena: Arena) -> None:
             "world/discs",
             rr.Points2D([d.centre for d in discs], radii=[d.radius for d in discs], colors=STONE),
         )
+    log("learner/policy/frame", frame())
     places = [light.position for light in arena.lights]
     log("world/light", rr.Points2D(places, colors=YELLOW, radii=0.14, labels=["light"] * len(places)))
     robot = arena.robot

@@ -40,7 +40,7 @@ class Translator:
         self._episodes: list[Episode] = []
         self._episode = -1
         self._recent: deque[bool] = deque(maxlen=50)
-        self._driver = self._framed = ""
+        self._driver = ""
         self._models = {"sonar": "", "light": ""}
         self._rewards: deque[float] = deque(maxlen=MEAN)
         self.summary = Summary(world.run, world.arena.name)
@@ -179,10 +179,9 @@ class Translator:
         if math.prod(percept.sizes) == len(table) == len(visits) > 0:
             rr.log("learner/table", rr.Tensor(table, dim_names=["state", "action"]), recording=log)
             rr.log("learner/visits", rr.BarChart(visits, color=BLUE), recording=log)
-            if self._framed != chunk.percept:  # once: a viewer's server keeps what is static for ever
-                self._framed = chunk.percept
-                rr.log("learner/policy/frame", policy.frame(percept), static=True, recording=log)
-            rr.log("learner/policy/best", policy.arrows(percept, table, visits), recording=log)
+            moving, still = policy.arrows(percept, table, visits)
+            rr.log("learner/policy/best", moving, recording=log)
+            rr.log("learner/policy/still", still, recording=log)
             rr.log("learner/policy/here", policy.present(percept, chunk.state[-1]), recording=log)
 
     def _text(self, tick: int, text: str, level: rr.TextLogLevel = rr.TextLogLevel.INFO) -> None:
