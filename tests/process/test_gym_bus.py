@@ -146,6 +146,23 @@ def test_killed_sensors_that_come_back_are_not_noticed(system, world, start):
     there.close()
 
 
+def test_a_killed_simulation_continues_the_run_that_was_begun(start, world, tmp_path):
+    words = ["sim", "--name", world, "--run", "r", "--seed", 9, "--journal", tmp_path / "sim.journal"]
+    sim, sensors = start(*words), start("sensors", "--name", world)
+    expected, found = walk(gymnasium.make(NAME, percept="sensors"), 600, 2), list[tuple]()
+    there = make(world, percept="sensors")
+    walker = threading.Thread(target=lambda: found.extend(walk(there, 600, 2)))
+    walker.start()
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.run.startswith("r.") and status.tick > 100, sim, sensors)
+        sim.kill()
+        sim = start(*words)
+    walker.join()
+    for one, other in zip(expected, found, strict=True):
+        np.testing.assert_array_equal(one[1], other[1])
+    there.close()
+
+
 def test_a_program_that_forgets_to_close_ends_and_frees_the_seat(system, world):
     script = (
         f"import gymnasium; e = gymnasium.make({NAME!r}, connect='local', world={world!r}); e.reset(seed=1); e.step(4)"

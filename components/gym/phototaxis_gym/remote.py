@@ -4,7 +4,7 @@ import time
 import weakref
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from gymnasium.error import Error
@@ -97,15 +97,14 @@ class Link:
 
     def _sit(self) -> None:
         """Take the seat, if it is not ours."""
+        self._seek("take over")
+        self._hear(lambda readings: readings.driver == self.ident, lambda _: self._seek("take over"), seated=False)
 
-        def seek(_: object = None) -> None:
-            if time.monotonic() >= self._sought_at:
-                self._sought_at = time.monotonic() + SEEK_EVERY
-                self._bus.control(Control("take over", self.ident))
-
-        self._sought_at = 0.0
-        seek()
-        self._hear(lambda readings: readings.driver == self.ident, seek, seated=False)
+    def _seek(self, verb: Literal["claim", "take over"]) -> None:
+        """Ask for the seat, now and then."""
+        if time.monotonic() >= self._sought_at:
+            self._sought_at = time.monotonic() + SEEK_EVERY
+            self._bus.control(Control(verb, self.ident))
 
     def _hear(
         self,
@@ -120,9 +119,11 @@ class Link:
             self._notice(event)
             if event is not None and event.topic == f"{self._prefix}readings":
                 readings = event.message
-                if seated and readings.driver != self.ident:
-                    raise Error(f"{readings.driver or 'nobody'} holds the seat now; reset(seed=…) takes it back")
-                if wanted(readings):
+                if seated and readings.driver not in ("", self.ident):
+                    raise Error(f"{readings.driver} holds the seat now; reset(seed=…) takes it back")
+                if seated and not readings.driver:
+                    self._seek("claim")  # a simulation that is back knows nothing of who drove
+                elif wanted(readings):
                     return readings
                 otherwise(readings)
         missing = [role for role in ("sim", "sensors") if role not in self._present]

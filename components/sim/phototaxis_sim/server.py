@@ -1,5 +1,7 @@
 """The simulation on the bus: asks each tick, waits for its answer, keeps the seat and the status."""
 
+import re
+import secrets
 import sys
 import time
 from collections import deque
@@ -19,7 +21,6 @@ from phototaxis.messages import (
     SimLog,
     State,
     Status,
-    run_name,
 )
 from phototaxis.protocol import Question
 
@@ -62,6 +63,7 @@ class Server:
     ):
         self._bus, self._pace, self._journal = bus, pace, journal
         self._sim: Any = simulation
+        self._root = simulation.world.run[:50]
         self._prefix = "crowd/" if simulation.world.robots > 1 else ""
         self._patience, self._logged = patience, ""
         self._heard_of, self._heard_at = "", 0.0
@@ -254,9 +256,9 @@ class Server:
         return ""
 
     def _begin(self, seed: int) -> None:
-        """A new run in the same arena, under a name of its own."""
+        """A new run in the same arena; its name says from which it comes, for the journal."""
         self._log.flush()
-        self._sim = self._sim.anew(seed, run_name())
+        self._sim = self._sim.anew(seed, f"{self._root}.{secrets.token_hex(2)}")
         self._held, self._started, self._finished = None, None, False
         self._recent.clear()
         self._ended.clear()
@@ -341,6 +343,8 @@ class Server:
         """Restore what the journal holds of this run, or begin a new journal."""
         frames = journal.read()
         snapshot = msgspec.msgpack.decode(frames[0], type=Snapshot) if frames else None
+        if snapshot is not None and re.fullmatch(re.escape(self._root) + r"\.[0-9a-f]{4}", snapshot.run):
+            self._sim = self._sim.anew(snapshot.seed, snapshot.run)  # it was begun later, by request
         if snapshot is None or snapshot.run != self._sim.world.run:
             journal.begin(self._header())
             return

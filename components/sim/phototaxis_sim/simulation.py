@@ -17,6 +17,7 @@ class Snapshot(Struct):
     """A run at the first tick of an episode."""
 
     run: str
+    seed: int
     tick: int
     episode: int
     epoch: int
@@ -100,6 +101,7 @@ class Simulation:
         """What `restore` needs to begin the present episode again; only at its first tick."""
         return Snapshot(
             self.world.run,
+            self.world.seed,
             self._tick,
             self._episode,
             self._epoch,

@@ -4,13 +4,14 @@ import sys
 import time
 from collections import deque
 from collections.abc import Sequence
+from itertools import cycle
 from typing import NamedTuple
 
 from phototaxis.errors import ComponentFailed
 
 from phototaxis_sensors.fmu.host import Failed, Host, Team
 from phototaxis_sensors.fmu.rigs import Rig
-from phototaxis_sensors.fmu.wiring import Wire, Wiring, bounds
+from phototaxis_sensors.fmu.wiring import Wire, Wiring, bounds, size
 from phototaxis_sensors.model import BuiltIn, Moment, SensorModel
 
 RESTARTS, WITHIN = 3, 60.0
@@ -42,9 +43,9 @@ class Stepped:
         self._episode, self._tick = -1, -1
         self._steps: deque[Step] = deque(maxlen=REMEMBERED)
         self._failures: deque[float] = deque(maxlen=RESTARTS + 1)
-        self._output = wiring.outputs[0]
-        self._low, self._high = _limits(self._output)
-        self._plain = self._output.factor == 1 and self._output.offset == 0
+        outputs = self._outputs = [wire for wire in wiring.outputs for _ in range(size(wire))]
+        self._limits = [_limits(wire) for wire in outputs]
+        self._plain = all((wire.factor, wire.offset) == (1, 0) for wire in outputs)
         self.anew = -1
         """Tick at which it had to forget the earlier part of an episode; −1: never."""
 
@@ -70,7 +71,7 @@ class Stepped:
             outputs = self._again(why)
         if self._plain:
             return outputs
-        return [(value - self._output.offset) / self._output.factor for value in outputs]
+        return [(value - wire.offset) / wire.factor for value, wire in zip(outputs, cycle(self._outputs), strict=False)]
 
     def _again(self, why: Failed) -> Sequence[float]:
         """Restart it and lead it through the episode again."""
@@ -94,10 +95,11 @@ class Stepped:
                 why = error
 
     def _checked(self, outputs: Sequence[float]) -> Sequence[float]:
-        for value in outputs:
-            if not self._low <= value <= self._high:  # neither is NaN
+        for place, (value, (low, high)) in enumerate(zip(outputs, cycle(self._limits), strict=False)):
+            if not low <= value <= high:  # neither is NaN
                 self._host.stop()
-                raise Failed(f"its {self._output.variable.name} is {value:g}, not in {self._low:g} to {self._high:g}")
+                name = self._outputs[place % len(self._outputs)].variable.name
+                raise Failed(f"its {name} is {value:g}, not in {low:g} to {high:g}")
         return outputs
 
 

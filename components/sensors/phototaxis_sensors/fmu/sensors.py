@@ -20,6 +20,9 @@ from phototaxis_sensors.model import SensorModel
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.suite import Models, built_in
 
+PROCESSES = 64
+"""Most processes for an FMU of which a process can have only one instance."""
+
 
 class Wired(NamedTuple):
     """An FMU and how it is connected."""
@@ -101,6 +104,11 @@ class FmuSensors:
         self._warn(wired, period)
         options = self._options
         rest = period, options.fmu_timeout, options.allow_compile
+        if wired.fmu.once and instances > PROCESSES:
+            raise UserError(
+                f"{wired.fmu.file}: a process can have it once, and {instances} instances are needed; "
+                f"at most {PROCESSES} processes are started (with evaluate: fewer --placements)"
+            )
         if wired.fmu.once and instances > 1:
             host = Team([Host(wired.fmu, wired.wiring, 1, *rest) for _ in range(instances)])
         else:
