@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from phototaxis.errors import UserError
 from phototaxis_lab.cell import Cell, Outcome, System, learn, run
-from phototaxis_lab.experiment import Options, cells, main, seed_range
+from phototaxis_lab.experiment import Options, cells, main
 from phototaxis_lab.results import Results
+from phototaxis_lab.running import seed_range
 from phototaxis_lab.statistics import difference_interval, mean_interval, median_interval
 from phototaxis_sim import arenas
 

@@ -4,25 +4,15 @@ import json
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from msgspec import Meta, Struct
+from msgspec import Meta, field
 from phototaxis.errors import UserError
 from phototaxis.options import parse
 
-SEEDS = Annotated[str, Meta(pattern=r"^[0-9]+:[0-9]+$")]
+from phototaxis_lab.running import SEEDS, Running, seed_range
+
 LIST = Annotated[str, Meta(pattern=r"^[^, ]+(,[^, ]+)*$")]
-
-
-class Running(Struct, kw_only=True):
-    """Options of everything that computes many cells."""
-
-    jobs: Annotated[int, Meta(ge=-1, le=10_000)] = -1
-    """processes at a time; -1: one for each core"""
-    backend: Literal["local", "dask"] = "local"
-    """where to compute: this machine, or a Dask cluster whose workers have phototaxis installed"""
-    scheduler: str = ""
-    """address of the Dask scheduler, as in tcp://HOST:8786; trust it: Dask's messages can run code"""
 
 
 class Options(Running, kw_only=True):
@@ -40,7 +30,7 @@ class Options(Running, kw_only=True):
     """A:B: the seeds from A to B − 1"""
     arena: str = "paper"
     """name of a shipped arena, or a TOML file"""
-    set: list[str] = []
+    set: list[str] = field(default_factory=list)
     """NAME=VALUE: an option of the agent, for all; may be repeated"""
     out: str = "runs/experiment"
     """folder of the results; an interrupted experiment continues there"""
@@ -73,15 +63,6 @@ def cells(options: Options) -> list[Any]:
         system.check()
     epochs = [_steps(text) for text in options.epochs.split(",")]
     return [Cell(*what) for what in product(systems, epochs, seed_range(options.seeds))]
-
-
-def seed_range(text: str) -> range:
-    """The seeds A to B − 1 of A:B; UserError when there are none."""
-    first, _, end = text.partition(":")
-    seeds = range(int(first), int(end))
-    if not seeds:
-        raise UserError(f"--seeds {text}: no seed from {first} to {end}")
-    return seeds
 
 
 def _pair(text: str) -> tuple[str, str]:

@@ -11,9 +11,9 @@ from phototaxis.errors import UserError
 from tqdm import tqdm
 
 from phototaxis_lab.cell import Cell, Outcome, System
-from phototaxis_lab.experiment import Running
 from phototaxis_lab.parallel import cluster, outcomes
 from phototaxis_lab.results import Results
+from phototaxis_lab.running import Running
 from phototaxis_lab.statistics import mean_interval, median_interval
 
 QUIET = 30.0

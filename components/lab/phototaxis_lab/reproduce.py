@@ -8,7 +8,7 @@ from pathlib import Path
 from phototaxis.errors import UserError
 from phototaxis.options import parse
 
-from phototaxis_lab.experiment import SEEDS, Running, seed_range
+from phototaxis_lab.running import SEEDS, Running, seed_range
 
 
 class Options(Running, kw_only=True):

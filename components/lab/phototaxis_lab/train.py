@@ -10,7 +10,7 @@ from phototaxis.checkpoint import save
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 
-from phototaxis_lab.experiment import Running, seed_range
+from phototaxis_lab.running import Running, seed_range
 
 
 class Options(Running, kw_only=True):

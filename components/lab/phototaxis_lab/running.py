@@ -1,0 +1,28 @@
+"""What all commands share that compute many cells: where, how many at a time, and which seeds."""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+from phototaxis.errors import UserError
+
+SEEDS = Annotated[str, Meta(pattern=r"^[0-9]+:[0-9]+$")]
+
+
+class Running(Struct, kw_only=True):
+    """Options of everything that computes many cells."""
+
+    jobs: Annotated[int, Meta(ge=-1, le=10_000)] = -1
+    """processes at a time; -1: one for each core"""
+    backend: Literal["local", "dask"] = "local"
+    """where to compute: this machine, or a Dask cluster whose workers have phototaxis installed"""
+    scheduler: str = ""
+    """address of the Dask scheduler, as in tcp://HOST:8786; trust it: Dask's messages can run code"""
+
+
+def seed_range(text: str) -> range:
+    """The seeds A to B − 1 of A:B; UserError when there are none."""
+    first, _, end = text.partition(":")
+    seeds = range(int(first), int(end))
+    if not seeds:
+        raise UserError(f"--seeds {text}: no seed from {first} to {end}")
+    return seeds
