@@ -148,7 +148,7 @@ def test_an_agent_with_good_credentials_can_do_what_an_agent_does_and_no_more(gu
 def test_the_shipped_configuration_and_page_are_those_of_the_tables(tmp_path):
     done = phototaxis("check", "rights")
     assert done.returncode == 0, done.stderr
-    assert "| agent | command, log/agent | readings |" in done.stdout
+    assert "| agent | command, crowd/command, log/agent | readings, crowd/readings |" in done.stdout
     assert phototaxis("check", "wire").returncode == 0
     file = tmp_path / "router.json5"
     assert phototaxis("check", "rights", "--file", file, "--worlds", "a,b", "--write").returncode == 0

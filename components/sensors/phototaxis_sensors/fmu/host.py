@@ -73,7 +73,7 @@ class Host:
             when it cannot be loaded.
         """
         self.stop()
-        self._folder = TemporaryDirectory(prefix="phototaxis-fmu-")
+        self._folder = TemporaryDirectory(prefix="phototaxis-fmu-", ignore_cleanup_errors=True)
         self._unpack(Path(self._folder.name))
         self._process = subprocess.Popen(
             [sys.executable, "-m", "phototaxis_sensors.fmu.worker"],

@@ -29,7 +29,7 @@ class Setup(msgspec.Struct):
     """What the parent tells first."""
 
     folder: str
-    """Of the unpacked FMU; it is removed when the parent is gone."""
+    """Of the unpacked FMU; the worker removes it in the end."""
     version: int
     identifier: str
     token: str
@@ -198,8 +198,7 @@ def serve(source: int, answers: int) -> None:
     text = bytearray(LENGTH.unpack(length)[0])
     read(source, memoryview(text))
     setup = msgspec.json.decode(text, type=Setup)
-    parent = os.getppid()
-    threading.Thread(target=_outlive, args=(parent, setup.folder), daemon=True).start()
+    threading.Thread(target=_outlive, args=(os.getppid(), setup.folder), daemon=True).start()
     said: deque[str] = deque(maxlen=1)
     try:
         worker = Worker(setup, said)
@@ -213,8 +212,7 @@ def serve(source: int, answers: int) -> None:
         words = why(error, said).encode()
         with suppress(BrokenPipeError):
             os.write(answers, HEAD.pack(FAILED, len(words)) + words)
-    if os.getppid() != parent:
-        shutil.rmtree(setup.folder, ignore_errors=True)
+    shutil.rmtree(setup.folder, ignore_errors=True)  # the parent, if it is still there, finds nothing left to do
 
 
 def _outlive(parent: int, folder: str) -> None:
