@@ -1,9 +1,11 @@
 """The Gymnasium environment as a client of a running system: the same trajectories, rules and errors."""
 
 import signal
+import socket
 import subprocess
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator
 
@@ -14,7 +16,7 @@ from gymnasium.error import Error, InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from rerun_files import series
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
-from support import Process, observer, wait_status
+from support import Process, observer, phototaxis, wait_status
 
 NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
 PERCEPTS = ("simple", "rich", "continuous", "sensors")
@@ -58,6 +60,26 @@ def test_ten_thousand_steps_are_the_same_here_and_there(system, world):
         np.testing.assert_array_equal(one[1], other[1])
         assert one[2:] == other[2:]
     there.close()
+
+
+def test_through_a_router(start, world):
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    router = start("router", "--listen", endpoint)
+    there = ["--name", world, "--connect", endpoint]
+    deadline = time.monotonic() + 20
+    while phototaxis("health", "router", "--connect", endpoint).returncode:
+        router.alive()
+        assert time.monotonic() < deadline
+    started = [start("sim", *there), start("sensors", *there)]
+    here = gymnasium.make(NAME, percept="continuous")
+    remote = gymnasium.make(NAME, percept="continuous", connect=endpoint, world=world, timeout=20.0)
+    for one, other in zip(walk(here, 300, 5), walk(remote, 300, 5), strict=True):
+        np.testing.assert_array_equal(one[1], other[1])
+        assert one[2:] == other[2:]
+    remote.close()
+    for process in started:
+        process.alive()
 
 
 def test_the_checkers_find_nothing(system, world):
