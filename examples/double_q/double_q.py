@@ -5,14 +5,16 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta, Struct
 from phototaxis.task import ACTIONS, Percept, State
-from phototaxis_agent.learner import Learner, Transition, discrete, stored
+from phototaxis_agent.learner import Learner, Transition, discrete, falling, stored
 
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
     """Of the two tables."""
 
-    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.3
-    """learning rate"""
+    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.16
+    """learning rate at the first epoch; it falls geometrically to `alpha_end`"""
+    alpha_end: Annotated[float, Meta(gt=0, le=1)] = 0.01
+    """learning rate at the end"""
     gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.75
     """discount factor"""
 
@@ -37,7 +39,7 @@ class DoubleQ(Learner):
         best = max(self._allowed, key=lambda action: following[chosen, action])
         value = 0.0 if transition.terminated else self._options.gamma * following[1 - chosen, best]
         error = transition.reward + value - self._tables[here]
-        self._tables[here] += self._options.alpha * error
+        self._tables[here] += falling(self._options.alpha, self._options.alpha_end, transition.progress) * error
         return float(error)
 
     def save(self) -> dict[str, np.ndarray]:
