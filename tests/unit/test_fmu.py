@@ -156,6 +156,16 @@ def test_names_units_and_parameters(fmu: Built, paper: Arena, sensors, tmp_path:
         sensors(light_fmu=str(fmu("light", 3)), fmu_map=["colour=range"])
 
 
+def test_another_step_than_the_suggested_one_is_said_once(fmu: Built, paper: Arena, sensors, tmp_path: Path, capsys):
+    experiment = '<DefaultExperiment stepSize="0.01" />\n  <ModelVariables>'
+    file = described(fmu("lag", 2), tmp_path / "s.fmu", "<ModelVariables>", experiment)
+    make = sensors(light_fmu=str(file))
+    make.try_out()
+    make(paper, Scene(paper))
+    line = "light FMU s.fmu suggests steps of 0.01 s; it gets steps of 0.5 s, the control period"
+    assert capsys.readouterr().err.count(line) == 1
+
+
 def test_what_cannot_be_wired(fmu: Built, tmp_path: Path):
     light, sonar = fmu("light", 3), fmu("sonar", 3)
     cases = [

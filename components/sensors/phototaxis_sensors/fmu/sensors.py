@@ -91,6 +91,7 @@ class FmuSensors:
         for kind, wired in self._wired.items():
             sensors = len(arena.robot.sonars) // wired.wiring.width if kind == "sonar" else 2
             each = sensors * (len(arena.lights) if kind == "light" and wired.wiring.ports != ["raw"] else 1)
+            self._warn(wired, arena.motion.control_period)
             host = self._host(wired, count * each, arena.motion.control_period)
             crews[kind] = Crew(Stepped(host, wired.wiring, wired.label), wired.wiring)
         return FmuCrowd(world, crews.get("sonar"), crews.get("light"))
@@ -101,7 +102,6 @@ class FmuSensors:
             self._running.pop().stop()
 
     def _host(self, wired: Wired, instances: int, period: float) -> Host | Team:
-        self._warn(wired, period)
         options = self._options
         rest = period, options.fmu_timeout, options.allow_compile
         if wired.fmu.once and instances > PROCESSES:
@@ -122,13 +122,15 @@ class FmuSensors:
         return host
 
     def _warn(self, wired: Wired, period: float) -> None:
+        """Say so when the FMU would rather be stepped otherwise."""
         experiment = wired.fmu.description.defaultExperiment
         step = float(experiment.stepSize) if experiment is not None and experiment.stepSize else period
-        if step != period and not self._running:
+        if step != period:
             line = f"{wired.label} suggests steps of {step:g} s; it gets steps of {period:g} s, the control period"
             print(f"sensors: {line}", file=sys.stderr, flush=True)
 
     def _model(self, wired: Wired, arena: Arena, rig: Rig, builtin: SensorModel) -> FmuModel:
+        self._warn(wired, arena.motion.control_period)
         host = self._host(wired, rig.instances, arena.motion.control_period)
         fallback = builtin if self._options.fmu_fallback else None
         return FmuModel(Stepped(host, wired.wiring, wired.label), rig, fallback, wired.fmu.name)
