@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from engine import System, docker, free_port
+from engine import System, docker
 
 PROJECT = Path(__file__).resolve().parents[2]
 NEEDED = "PHOTOTAXIS_NEEDS_DOCKER"
@@ -44,25 +44,22 @@ def system(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
             shutil.copy(wheel, sources / "deploy/wheels")
     wheels = {wheel.name.split("-")[0] for wheel in (sources / "deploy/wheels").glob("*.whl")}
     name = f"phototaxis-test-{secrets.token_hex(3)}"
-    bus, grpc, web = (free_port() for _ in range(3))
     environment = {
         "PHOTOTAXIS_TAG": name,
         "PHOTOTAXIS_HEALTH_INTERVAL": "2s",
-        "PHOTOTAXIS_BUS_PORT": str(bus),
-        "PHOTOTAXIS_GRPC_PORT": str(grpc),
-        "PHOTOTAXIS_WEB_PORT": str(web),
         "PHOTOTAXIS_SPEED": "0",
         **({"TORCH_INDEX": ""} if "torch" in wheels else {}),
     }
-    system = System(name, sources / "deploy", environment, bus, grpc, web)
+    system = System(name, sources / "deploy", environment)
     try:
         began = time.monotonic()
         system.compose("build")
         built = time.monotonic()
+        system = system.beside(name)  # building takes long enough for a port to be taken
         system.compose("up", "-d", "--wait")
         healthy = time.monotonic()
-        with system.bus() as bus_:
-            system.until(bus_, lambda status: status.tick > 0)
+        with system.bus() as bus:
+            system.until(bus, lambda status: status.tick > 0)
         system.figures = {
             "build": built - began,
             "up until all are healthy": healthy - built,

@@ -3,18 +3,17 @@
 import json
 import os
 import shutil
-import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from copy import copy
 from pathlib import Path
 from typing import Any
 
 from phototaxis.bus import Bus
 from phototaxis.messages import Status
 from phototaxis.session import BusOptions, open_session
+from phototaxis_launcher.ports import free_ports
 
 DEADLINE = 60.0
 DOCKER = shutil.which("docker") or "docker"
@@ -30,17 +29,14 @@ def docker(*words: str, check: bool = True, **environment: str) -> str:
     return done.stdout
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return probe.getsockname()[1]
-
-
 class System:
-    """One project of docker compose."""
+    """One project of docker compose, on free ports of its own."""
 
-    def __init__(self, name: str, folder: Path, environment: dict[str, str], bus: int, grpc: int, web: int):
-        self.name, self.bus_port, self.grpc_port, self.web_port = name, bus, grpc, web
-        self._environment, self.folder = environment, folder
+    def __init__(self, name: str, folder: Path, environment: dict[str, str]):
+        ports = self.bus_port, self.grpc_port, self.web_port = free_ports(3)
+        published = zip(("BUS", "GRPC", "WEB"), ports, strict=True)
+        self._environment = environment | {f"PHOTOTAXIS_{what}_PORT": str(port) for what, port in published}
+        self.name, self.folder = name, folder
         self._files = ["-f", str(folder / "compose.yaml"), "-f", str(folder / "compose.own-router.yaml")]
         self.figures: dict[str, float] = {}
 
@@ -49,13 +45,8 @@ class System:
         return docker("compose", "-p", self.name, *self._files, *words, check=check, **self._environment | environment)
 
     def beside(self, name: str) -> "System":
-        """Another project of the same images, on ports of its own."""
-        bus, grpc, web = (free_port() for _ in range(3))
-        other = copy(self)
-        other.name, other.bus_port, other.grpc_port, other.web_port = name, bus, grpc, web
-        ports = {"BUS": bus, "GRPC": grpc, "WEB": web}
-        other._environment = self._environment | {f"PHOTOTAXIS_{what}_PORT": str(port) for what, port in ports.items()}
-        return other
+        """A project of the same images, on ports that are free now."""
+        return System(name, self.folder, self._environment)
 
     def inspect(self, service: str) -> dict[str, Any]:
         """What the engine knows of a service's container."""

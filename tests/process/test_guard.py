@@ -4,7 +4,6 @@ import json
 import os
 import secrets
 import shutil
-import socket
 import stat
 import subprocess
 import time
@@ -17,21 +16,17 @@ from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
 from phototaxis.router import client_config
 from phototaxis.session import BusOptions, open_session
+from phototaxis_launcher.ports import free_ports
 from support import Process, command, phototaxis, wait_status
 
 WORLDS = ("a", "b")
 ANYWHERE = "0.0.0.0"  # noqa: S104
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return probe.getsockname()[1]
-
-
 @pytest.fixture(scope="module")
 def certs(tmp_path_factory):
     """Certificates for two worlds, and the port of their router."""
-    port, folder = free_port(), tmp_path_factory.mktemp("guard") / "certs"
+    (port,), folder = free_ports(1), tmp_path_factory.mktemp("guard") / "certs"
     done = phototaxis("certs", "--out", folder, "--worlds", ",".join(WORLDS), "--port", port)
     assert done.returncode == 0, done.stderr
     return folder, port
@@ -169,11 +164,11 @@ def test_keys_and_passwords_are_for_their_owner_alone_and_nothing_is_overwritten
 
 
 def test_a_router_beyond_this_machine_needs_credentials(start, tmp_path):
-    done = phototaxis("router", "--listen", f"tcp/{ANYWHERE}:{free_port()}")
+    done = phototaxis("router", "--listen", f"tcp/{ANYWHERE}:{free_ports(1)[0]}")
     assert done.returncode == 2
     assert "nothing guards it" in done.stderr
     folder = tmp_path / "certs"
-    assert phototaxis("certs", "--out", folder, "--listen", ANYWHERE, "--port", free_port()).returncode == 0
+    assert phototaxis("certs", "--out", folder, "--listen", ANYWHERE, "--port", *free_ports(1)).returncode == 0
     router: Process = start("router", "--zenoh-config", folder / "router-mtls.json5")
     deadline = time.monotonic() + 20
     while "is up" not in router.stderr:

@@ -1,7 +1,6 @@
 """Agents of others: one imports nothing of this project, one is a plug-in, one breaks the rules."""
 
 import json
-import socket
 import subprocess
 import sys
 import time
@@ -12,6 +11,7 @@ from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
 from phototaxis.messages import Command, Control, Readings
 from phototaxis.session import BusOptions, open_session
+from phototaxis_launcher.ports import free_ports
 from support import Process, command, observer, phototaxis, wait_status
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -20,8 +20,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 @pytest.fixture
 def router(start):
     """A router of ours on a free loopback port; its endpoint."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tcp/127.0.0.1:{free_ports(1)[0]}"
     process: Process = start("router", "--listen", endpoint)
     deadline = time.monotonic() + 20
     while "is up" not in process.stderr:

@@ -1,7 +1,6 @@
 """The Gymnasium environment as a client of a running system: the same trajectories, rules and errors."""
 
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 from gymnasium.error import Error, InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
+from phototaxis_launcher.ports import free_ports
 from rerun_files import series
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 from support import Process, observer, phototaxis, wait_status
@@ -63,8 +63,7 @@ def test_ten_thousand_steps_are_the_same_here_and_there(system, world):
 
 
 def test_through_a_router(start, world):
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tcp/127.0.0.1:{free_ports(1)[0]}"
     router = start("router", "--listen", endpoint)
     there = ["--name", world, "--connect", endpoint]
     deadline = time.monotonic() + 20

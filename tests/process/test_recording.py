@@ -8,6 +8,7 @@ import subprocess
 import urllib.request
 from pathlib import Path
 
+from phototaxis_launcher.ports import free_ports
 from rerun_files import RERUN, newest_tick, salvaged, series
 from support import children, observer, phototaxis, result, wait, wait_status
 
@@ -51,8 +52,7 @@ def test_a_restarted_recorder_asks_for_what_it_missed(up, world):
 
 
 def test_the_viewers_page_lives_and_dies_with_the_recorder(start, world, tmp_path):
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
+    (port,) = free_ports(1)
     words = ("up", "--name", world, "--out", tmp_path, "--epochs", 0, "--speed", 20, "--json")
     launcher = start(*words, "--grpc-port", 0, "--web-port", port)
     with observer(world) as bus:

@@ -1,21 +1,20 @@
 """The same run through a router, from flags and from ZENOH_CONFIG; no door is left open unasked."""
 
 import json
-import socket
 
 import pytest
 import zenoh
 from phototaxis.checkpoint import load
 from phototaxis.errors import UserError
 from phototaxis.session import BusOptions, open_session, refuse_open_door
+from phototaxis_launcher.ports import free_ports
 from support import phototaxis, wait_status
 
 
 @pytest.fixture
 def router():
     """A Zenoh router on a free loopback port; yields its endpoint."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tcp/127.0.0.1:{free_ports(1)[0]}"
     config = zenoh.Config.from_json5(
         json.dumps(
             {
@@ -53,8 +52,7 @@ def test_components_are_clients_of_a_router(start, world, router, way, tmp_path,
 
 
 def test_a_missing_router_is_one_line(start, world):
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
+    (port,) = free_ports(1)
     process = start("sensors", "--name", world, "--connect", f"tcp/127.0.0.1:{port}")
     assert process.end() == 3
     assert process.stderr.startswith("phototaxis: error: the bus cannot be opened")

@@ -10,7 +10,7 @@ import pytest
 from phototaxis.errors import ComponentFailed, Unavailable, UserError
 from phototaxis_launcher import view
 from phototaxis_launcher.headless import picture, shown_tick, viewer
-from phototaxis_launcher.up import _port
+from phototaxis_launcher.ports import free_ports
 from PIL import Image
 from rerun_files import RERUN
 from support import DEADLINE, children, observer, phototaxis, wait_status
@@ -31,7 +31,7 @@ def gpu(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 
 def test_the_viewer_shows_the_newest_tick(gpu, start, world, tmp_path):
-    port = _port(0)
+    (port,) = free_ports(1)
     words = ("up", "--name", world, "--out", tmp_path, "--epochs", 0, "--speed", 10, "--web-port", -1, "--json")
     launcher = start(*words, "--grpc-port", port)
     with observer(world) as bus:
@@ -73,7 +73,7 @@ def test_what_cannot_be_viewed_is_one_line(tmp_path: Path):
     with pytest.raises(UserError, match="no recording of a run 'x'"):
         view.find("x", tmp_path)
     with pytest.raises(Unavailable, match="nothing is being recorded"):
-        view.main(["--grpc-port", str(_port(0))])
+        view.main(["--grpc-port", str(*free_ports(1))])
     failed = phototaxis("view", "--picture", "x.jpg")
     assert failed.returncode == 2
     assert failed.stderr.count("\n") == 1

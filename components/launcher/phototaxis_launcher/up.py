@@ -3,7 +3,6 @@
 import json
 import re
 import signal
-import socket
 import sys
 import time
 from collections.abc import Sequence
@@ -20,6 +19,7 @@ from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
 
+from phototaxis_launcher.ports import free_ports
 from phototaxis_launcher.processes import Child
 from phototaxis_launcher.progress import Progress
 
@@ -92,7 +92,8 @@ class Run:
         for tick, learner in swaps:
             self._agent(self._successor(["--learner", learner]), "--take-over", f"--at={tick}")
         if not options.no_recorder:
-            grpc, web = _port(options.grpc_port), _port(options.web_port)
+            asked = (options.grpc_port, options.web_port)
+            grpc, web = (port or free for port, free in zip(asked, free_ports(2), strict=True))
             self.children["recorder"] = self._child(
                 "recorder", *bus, f"--output={self.recording}", f"--grpc-port={grpc}", f"--web-port={web}"
             )
@@ -320,11 +321,3 @@ def summarise(result: dict[str, object]) -> None:
 def _bus_flags(options: UpOptions) -> list[str]:
     only = BusOptions(**{field: getattr(options, field) for field in BusOptions.__struct_fields__})
     return flags(only)
-
-
-def _port(port: int) -> int:
-    """The port itself, or a free one for 0."""
-    if port != 0:
-        return port
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return probe.getsockname()[1]
