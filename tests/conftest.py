@@ -1,10 +1,15 @@
 """What all tests share: an arena, a setup."""
 
+import signal
+
 import pytest
 from fmus import fmu as fmu
 from phototaxis.arena import Arena
 from phototaxis_agent.setup import Setup, make_setup
 from phototaxis_sim import arenas
+
+# Started in the background of a script, the tests inherit an ignored SIGINT, and so would what they interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
