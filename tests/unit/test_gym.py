@@ -163,11 +163,31 @@ def test_continuous_wheels_and_the_nine_actions_agree(quiet):
         ({"arena": "mars"}, "no arena 'mars'"),
         ({"reward": "praise"}, "no reward 'praise'; there are: own, difference"),
         ({"action": "jump"}, "no actions 'jump'; there are: discrete, continuous"),
+        ({"cap": 0}, "cap 0: an episode has at least one step"),
+        ({"connect": "local", "world": "a/*"}, r"world 'a/\*': up to 40 letters"),
+        ({"connect": "127.0.0.1:7447"}, "an endpoint is like tcp/127.0.0.1:7447"),
     ],
 )
 def test_options_that_do_not_exist_are_gymnasiums_own_error(make, options, line):
     with pytest.raises(Error, match=line):
         make(NAME, **options)
+
+
+def test_one_robot_has_the_render_modes_that_it_says():
+    with pytest.raises(Error, match="no render_mode 'ansi'; there are: rgb_array, human"):
+        gymnasium.make(NAME).unwrapped.__class__(render_mode="ansi")
+
+
+@pytest.mark.parametrize("seed", [[1, 2], [1, -2, 3], [1, 2, 3, 4]])
+def test_many_robots_take_one_seed_each(seed):
+    with pytest.raises(Error, match="one number, or one for each of the 3 robots"):
+        gymnasium.make_vec(NAME, num_envs=3).reset(seed=seed)
+
+
+@pytest.mark.parametrize("count", [0, -1])
+def test_many_robots_are_at_least_one(count):
+    with pytest.raises(Error, match="at least one robot"):
+        gymnasium.make_vec(NAME, num_envs=count)
 
 
 def test_wrong_actions_and_steps_out_of_order_are_gymnasiums_own_errors():

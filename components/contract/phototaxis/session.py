@@ -124,26 +124,26 @@ def _file(options: BusOptions) -> str:
 def _config(mode: str, listen: list[str], connect: list[str]) -> zenoh.Config:
     retry = {"period_init_ms": 20, "period_max_ms": 100, "period_increase_factor": 1.5}
     block = {"wait_before_close": 500_000}
-    return zenoh.Config.from_json5(
-        json.dumps(
-            {
-                "mode": mode,
-                "listen": {"endpoints": listen},
-                "connect": {
-                    "endpoints": connect,
-                    "timeout_ms": 5_000 if mode == "client" else -1,
-                    "exit_on_failure": mode == "client",
-                    "retry": retry,
-                },
-                "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-                "transport": {
-                    "unicast": {"qos": {"enabled": mode != "peer"}},
-                    "shared_memory": {"enabled": False},
-                    "link": {"tx": {"lease": 1000, "queue": {"congestion_control": {"block": block}}}},
-                },
-            }
-        )
-    )
+    settings = {
+        "mode": mode,
+        "listen": {"endpoints": listen},
+        "connect": {
+            "endpoints": connect,
+            "timeout_ms": 5_000 if mode == "client" else -1,
+            "exit_on_failure": mode == "client",
+            "retry": retry,
+        },
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
+        "transport": {
+            "unicast": {"qos": {"enabled": mode != "peer"}},
+            "shared_memory": {"enabled": False},
+            "link": {"tx": {"lease": 1000, "queue": {"congestion_control": {"block": block}}}},
+        },
+    }
+    try:
+        return zenoh.Config.from_json5(json.dumps(settings))
+    except zenoh.ZError as error:
+        raise UserError(f"{_first_line(error)}; an endpoint is like tcp/127.0.0.1:7447") from None
 
 
 def open_session(role: str, options: BusOptions, ident: str = "") -> zenoh.Session:

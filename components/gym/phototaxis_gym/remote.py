@@ -13,6 +13,7 @@ from phototaxis.columns import FLAG, pack, unpack
 from phototaxis.component import made_up
 from phototaxis.errors import UserError
 from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, Refused, World
+from phototaxis.options import convert
 from phototaxis.session import BusOptions, open_session
 from phototaxis.task import CrowdReadings
 
@@ -38,7 +39,10 @@ class Link:
     def __init__(self, connect: str, world: str, timeout: float):
         self._present: set[str] = set()
         self._timeout, self._where = timeout, f"the world '{world}' ({connect})"
-        options = BusOptions(name=world)
+        try:
+            options = convert(BusOptions, {"name": world})
+        except UserError:
+            raise Error(f"world '{world}': up to 40 letters, digits, '_', '.' and '-'") from None
         if connect.endswith(".json5"):
             options.zenoh_config = connect
         elif connect != "local":

@@ -111,3 +111,16 @@ def actions(kind: str) -> spaces.Space[Any]:
     if kind == "continuous":
         return spaces.Box(-1.0, 1.0, (2,), np.float32)
     raise Error(f"no actions '{kind}'; there are: discrete, continuous")
+
+
+def limit(cap: int) -> int:
+    """The steps of an episode, at least one.
+
+    Raises
+    ------
+    gymnasium.error.Error
+        for fewer.
+    """
+    if cap < 1:
+        raise Error(f"cap {cap}: an episode has at least one step")
+    return cap

@@ -17,7 +17,7 @@ from phototaxis_sim import arenas
 from phototaxis_gym import CAP
 from phototaxis_gym.place import ManyHere, Places
 from phototaxis_gym.remote import ManyThere
-from phototaxis_gym.spaces import MOTORS, actions, observation, rewards
+from phototaxis_gym.spaces import MOTORS, actions, limit, observation, rewards
 
 SEEDS = 2**31
 REACHED, CAPPED = ENDS.index("reached"), ENDS.index("cap")
@@ -51,7 +51,9 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
             raise Error(f"render_mode {render_mode}: many robots are not drawn; leave it out")
         if connect and arena:
             raise Error(f"arena '{arena}': that is the running system's; leave it out with connect")
-        self.num_envs, self._cap = num_envs, cap
+        if num_envs < 1:
+            raise Error(f"num_envs {num_envs}: at least one robot is needed")
+        self.num_envs, self._cap = num_envs, limit(cap)
         try:
             self._place: Places = (
                 ManyThere(connect, world, timeout, num_envs) if connect else ManyHere(arenas.load(arena or "paper"))
@@ -75,6 +77,8 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         first = int(self.np_random.integers(SEEDS)) if seed is None else seed
         given = [first + row for row in range(count)] if isinstance(first, int) else first
         seeds = [int(self.np_random.integers(SEEDS)) if one is None else one for one in given]
+        if len(seeds) != count or min(seeds) < 0:
+            raise Error(f"seed={seed}: one number, or one for each of the {count} robots; none below 0")
         self._episodes, self._steps = np.zeros(count, int), np.zeros(count, int)
         self._ends = np.zeros(count, np.uint8)
         self._memory = Memories(count)
