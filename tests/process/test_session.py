@@ -86,15 +86,6 @@ def test_listening_beyond_this_machine_needs_to_be_asked_for(endpoint, open_door
         refuse_open_door(endpoint)
 
 
-@pytest.mark.parametrize("words", [["status", "--connect"], ["sim", "--listen"], ["router", "--listen"]])
-@pytest.mark.parametrize("endpoint", ["127.0.0.1:7447", "tcp/", ""])
-def test_what_is_no_endpoint_is_one_line(words, endpoint):
-    done = phototaxis(*words, endpoint)
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert done.stderr.endswith("an endpoint is like tcp/127.0.0.1:7447\n")
-
-
 def test_an_open_door_in_a_configuration_file_is_refused(world, tmp_path):
     file = tmp_path / "zenoh.json5"
     file.write_text('{mode: "peer", listen: {endpoints: ["tcp/0.0.0.0:0"]}}')

@@ -14,6 +14,7 @@ from gymnasium.utils.env_checker import check_env
 from phototaxis.messages import World
 from phototaxis.task import ACTIONS, REWARDS, CrowdReadings
 from phototaxis_agent.setup import make_setup
+from phototaxis_gym.single import LightSeeker
 from phototaxis_lab.loop import Loop
 from phototaxis_sim import arenas
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
@@ -175,7 +176,7 @@ def test_options_that_do_not_exist_are_gymnasiums_own_error(make, options, line)
 
 def test_one_robot_has_the_render_modes_that_it_says():
     with pytest.raises(Error, match="no render_mode 'ansi'; there are: rgb_array, human"):
-        gymnasium.make(NAME).unwrapped.__class__(render_mode="ansi")
+        LightSeeker(render_mode="ansi")
 
 
 @pytest.mark.parametrize("seed", [[1, 2], [1, -2, 3], [1, 2, 3, 4]])

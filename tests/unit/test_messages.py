@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from phototaxis.messages import SCHEMA, Command, Decoder, Refused, encode
+from phototaxis.messages import SCHEMA, Command, Control, Decoder, Refused, encode
 
 GOOD = {"run": "r", "tick": 3, "author": "a", "left": 0.5, "right": -1.0}
 decode = Decoder(Command, 200)
@@ -41,3 +41,9 @@ def test_messagepack_and_json_give_the_same_message():
 def test_what_is_not_a_command_is_refused(payload, reason):
     with pytest.raises(Refused, match=reason):
         decode(payload)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**53 + 1])
+def test_a_seed_that_cannot_be_one_is_refused_at_the_door(seed):
+    with pytest.raises(Refused, match="seed"):
+        Decoder(Control, 1000)(encode(Control("begin", seed=seed)))

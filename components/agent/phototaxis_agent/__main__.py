@@ -9,7 +9,7 @@ from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
-from phototaxis.messages import World
+from phototaxis.messages import Seed, World
 
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.server import Mode, Server
@@ -35,7 +35,7 @@ class Options(ComponentOptions, kw_only=True):
     """a frozen policy in the place of a learner: a file (.zip) that Stable-Baselines3 has saved"""
     trust: bool = False
     """load the policy although such a file can run any code: you trust who made it"""
-    agent_seed: Annotated[int, Meta(ge=0)] | None = None
+    agent_seed: Seed | None = None
     """seed of the learner and its exploration (default: the run's)"""
 
 

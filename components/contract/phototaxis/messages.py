@@ -22,6 +22,8 @@ MOST = 4096
 Motor = Annotated[float, Meta(ge=-1, le=1)]
 Name = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$")]
 Count = Annotated[int, Meta(ge=0)]
+Seed = Annotated[int, Meta(ge=0, le=2**53)]
+"""What JSON readers of all languages keep exactly."""
 
 End = Literal["", "reached", "cap", "asked"]
 """How an episode ends: it goes on, the light was reached (terminated), the step cap (truncated), by request."""
@@ -43,7 +45,7 @@ class World(Message):
 
     run: Name
     arena: Arena
-    seed: int
+    seed: Seed
     epochs: Count
     """Learning steps after which the run is finished; 0: it goes on until it is stopped."""
     robots: Annotated[int, Meta(ge=1, le=MOST)] = 1
@@ -253,7 +255,7 @@ class Control(Message):
     """take over: from which tick on."""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """speed: 0 is lockstep."""
-    seed: int = 0
+    seed: Seed = 0
     """begin: of the new run."""
 
 

@@ -9,7 +9,7 @@ from msgspec import Meta, Struct
 from phototaxis.checkpoint import load
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import World
+from phototaxis.messages import Seed, World
 from phototaxis.options import parse_groups
 
 
@@ -20,7 +20,7 @@ class Options(Struct, kw_only=True):
     """checkpoint (.npz) whose policy is measured"""
     placements: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
     """fresh random placements"""
-    seed: int = 1
+    seed: Seed = 1
     """decides the placements and the policy's draws; never those of a training"""
     arena: str = ""
     """another arena than the one of the training"""

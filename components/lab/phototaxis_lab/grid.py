@@ -35,6 +35,8 @@ def watched(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int, Outc
     """`parallel.outcomes`, with a progress bar that counts epochs; a line now and then where there is no terminal."""
     if running.backend == "dask" and not running.scheduler:
         raise UserError("--backend dask needs the address of a scheduler: --scheduler tcp://HOST:8786")
+    if running.jobs == 0:
+        raise UserError("--jobs 0: at least one process is needed, or -1 for one on each core")
     total, done, spoke = sum(cell.epochs for cell in cells), 0, time.monotonic()
     bar = tqdm(total=total, unit=" epochs", unit_scale=True, disable=not (cells and sys.stderr.isatty()))
     with cluster(running.backend, running.scheduler), bar:

@@ -9,6 +9,7 @@ from msgspec import Meta
 from phototaxis.checkpoint import save
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
+from phototaxis.messages import Seed
 
 from phototaxis_lab.running import Running, seed_range
 
@@ -18,7 +19,7 @@ class Options(Running, kw_only=True):
 
     arena: str = "paper"
     """name of a shipped arena, or a TOML file"""
-    seed: int = 0
+    seed: Seed = 0
     """decides everything: placements, noise, the learner and its exploration"""
     seeds: Annotated[str, Meta(pattern=r"^([0-9]+:[0-9]+)?$")] = ""
     """A:B: learn with each seed from A to B − 1 and evaluate each on 200 fresh placements"""

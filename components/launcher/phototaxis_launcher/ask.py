@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.errors import Unavailable, UserError
-from phototaxis.messages import Control, ControlReply, Status
+from phototaxis.messages import Control, ControlReply, Seed, Status
 from phototaxis.options import parse
 from phototaxis.session import BusOptions, open_session
 
@@ -29,7 +29,7 @@ class ControlOptions(BusOptions, kw_only=True):
     """what to do; step: one tick of a paused simulation; reset: end the episode; begin: a new run"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """for the verb speed: simulated seconds per second; 0: lockstep"""
-    seed: int = 0
+    seed: Seed = 0
     """for the verb begin: of the new run"""
 
 

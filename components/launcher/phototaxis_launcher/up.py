@@ -14,7 +14,7 @@ from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
 from phototaxis.errors import ComponentFailed, UserError
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import MOST, Launch, LaunchReply, Status, run_name
+from phototaxis.messages import MOST, Launch, LaunchReply, Seed, Status, run_name
 from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
@@ -36,7 +36,7 @@ class UpOptions(BusOptions, kw_only=True):
 
     arena: str = "paper"
     """name of a shipped arena, or a TOML file"""
-    seed: int = 0
+    seed: Seed = 0
     """decides everything: placements, noise, the learner and its exploration"""
     epochs: Annotated[int, Meta(ge=0)] = 3000
     """learning steps; 0: run until stopped"""

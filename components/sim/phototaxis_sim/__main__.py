@@ -9,7 +9,7 @@ from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
 from phototaxis.journal import Journal
-from phototaxis.messages import MOST, run_name
+from phototaxis.messages import MOST, Seed, run_name
 from phototaxis.options import parse
 
 
@@ -18,7 +18,7 @@ class Options(ComponentOptions, kw_only=True):
 
     arena: str = "paper"
     """name of a shipped arena, or a TOML file"""
-    seed: int = 0
+    seed: Seed = 0
     """decides placements and sensor noise"""
     epochs: Annotated[int, Meta(ge=0)] = 0
     """learning steps after which the run is finished; 0: run until stopped"""

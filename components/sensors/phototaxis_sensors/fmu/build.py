@@ -43,7 +43,7 @@ def build(example: Example, version: Version, file: Path, sources_only: bool = F
         if not sources_only:
             compile_sources(archive)
         try:
-            shutil.move(archive, file)
+            shutil.copyfile(archive, file)
         except OSError as error:
             raise UserError(f"{file}: {error.strerror}") from None
 
