@@ -122,6 +122,9 @@ def test_errors_are_gymnasiums_own(system, world, start):
         make(world, render_mode="rgb_array")
     with pytest.raises(Error, match="arena 'doorway': that is the running system's"):
         make(world, arena="doorway")
+    with pytest.raises(Error, match="seed 9007199254740993: Expected `int` <= 9007199254740992"):
+        environment.reset(seed=2**53 + 1)
+    environment.reset(seed=1)
     other = make(world)
     other.reset(seed=2)
     with pytest.raises(Error, match="holds the seat now"):

@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Any, Literal
 
+import msgspec
 import numpy as np
 from gymnasium.error import Error
 from phototaxis.bus import Bus, Event
 from phototaxis.columns import FLAG, pack, unpack
 from phototaxis.component import made_up
 from phototaxis.errors import UserError
-from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, Refused, World
+from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, Refused, Seed, World
 from phototaxis.options import convert
 from phototaxis.session import BusOptions, open_session
 from phototaxis.task import CrowdReadings
@@ -73,6 +74,10 @@ class Link:
 
     def begin(self, seed: int) -> Any:
         """The first readings of a run with this seed; whoever drives is asked to hand over first."""
+        try:
+            msgspec.convert(seed, Seed)
+        except msgspec.ValidationError as error:
+            raise Error(f"seed {seed}: {error}") from None
         self._sit()
         reply = self._bus.control(Control("begin", self.ident, seed=seed), timeout=self._timeout)
         if reply is None or not reply.ok:
