@@ -23,6 +23,7 @@ import msgspec
 import numpy as np
 from phototaxis.arena import Arena, Disc, Light
 from phototaxis.messages import Command, Decoder, Message, Readings, State, World, encode
+from phototaxis.ports import free_ports
 from phototaxis.task import PERCEPTS
 from phototaxis_agent.crowd import CrowdAgent
 from phototaxis_agent.learner import Transition, available
@@ -239,7 +240,7 @@ def recorder_cost(arena: Arena, loop: Loop) -> float:
     ticks, chunk, began = 8000, 16, 0.0
     with tempfile.TemporaryDirectory() as folder:
         world = World("bench", arena, 1, 0)
-        recording = open_recording(world, Path(folder) / "b.rrd", "127.0.0.1", free_port(), "64MiB")
+        recording = open_recording(world, Path(folder) / "b.rrd", "127.0.0.1", free_ports(1)[0], "64MiB")
         translator = Translator(recording, world)
         began = time.perf_counter()
         for first in range(0, ticks, chunk):
@@ -254,13 +255,6 @@ def recorder_cost(arena: Arena, loop: Loop) -> float:
         seconds = time.perf_counter() - began
         recording.disconnect()
     return seconds / ticks * 1e6
-
-
-def free_port() -> int:
-    import socket
-
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return probe.getsockname()[1]
 
 
 def cost(call: Callable[[], Any], times: int = 2000) -> float:

@@ -22,12 +22,14 @@ with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
         f"{world}/readings", lambda sample: inbox.put(msgpack.unpackb(sample.payload.to_bytes()))
     )
     token = session.liveliness().declare_token(f"{world}/alive/agent/{me}")  # lasts as long as the variable
-    newest, claim = -1, msgpack.packb({"verb": "claim", "agent": me})
+    run, newest, claim = "", -1, msgpack.packb({"verb": "claim", "agent": me})
     while True:
         try:
             readings = inbox.get(timeout=30)
         except Empty:
             break  # the world is gone
+        if readings["run"] != run:
+            run, newest = readings["run"], -1
         if not readings["driver"]:
             list(session.get(f"{world}/control", payload=claim, timeout=2))
         elif readings["driver"] == me and readings["tick"] >= newest:
@@ -36,5 +38,5 @@ with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
             ahead = min(readings["sonar"][3:5]) > 0.5
             motors = ((0, 1) if left > right else (1, 0)) if ahead else (-1, 1)
             end = "reached" if max(left, right) > 0.95 else ""
-            answer = {"run": readings["run"], "tick": newest, "author": me, "end": end}
+            answer = {"run": run, "tick": newest, "author": me, "end": end}
             publisher.put(msgpack.packb(answer | {"left": motors[0], "right": motors[1]}))

@@ -4,10 +4,10 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-import rerun_cli
+from phototaxis.viewer import rerun_program
 from rerun.chunk import RrdReader
 
-RERUN = str(Path(rerun_cli.__file__).parent / "rerun")
+RERUN = str(rerun_program())
 """The program itself: the script of that name would leave it an orphan."""
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from phototaxis.bus import Bus
 from phototaxis.messages import Status
+from phototaxis.ports import free_ports
 from phototaxis.session import BusOptions, open_session
-from phototaxis_launcher.ports import free_ports
 
 DEADLINE = 60.0
 DOCKER = shutil.which("docker") or "docker"

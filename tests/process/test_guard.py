@@ -14,9 +14,9 @@ import pytest
 import zenoh
 from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
+from phototaxis.ports import free_ports
 from phototaxis.router import client_config
 from phototaxis.session import BusOptions, open_session
-from phototaxis_launcher.ports import free_ports
 from support import Process, command, phototaxis, wait_status
 
 WORLDS = ("a", "b")

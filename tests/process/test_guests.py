@@ -10,8 +10,8 @@ import pytest
 from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
 from phototaxis.messages import Command, Control, Readings
+from phototaxis.ports import free_ports
 from phototaxis.session import BusOptions, open_session
-from phototaxis_launcher.ports import free_ports
 from support import Process, command, observer, phototaxis, wait_status
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

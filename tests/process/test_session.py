@@ -6,8 +6,8 @@ import pytest
 import zenoh
 from phototaxis.checkpoint import load
 from phototaxis.errors import UserError
+from phototaxis.ports import free_ports
 from phototaxis.session import BusOptions, open_session, refuse_open_door
-from phototaxis_launcher.ports import free_ports
 from support import phototaxis, wait_status
 
 

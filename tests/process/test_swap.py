@@ -9,7 +9,7 @@ import pytest
 from phototaxis.bus import Bus
 from phototaxis.messages import Command, Control
 from phototaxis.session import BusOptions, open_session
-from support import Process, observer, phototaxis, result, wait_status
+from support import DEADLINE, Process, observer, phototaxis, result, wait, wait_status
 
 EPOCHS = 3000
 HASHES = ("state_hash", "learner_hash")
@@ -195,6 +195,26 @@ def test_a_killed_simulation_gives_the_seat_back_to_its_driver(start, world, tmp
 
     found = {"state_hash": status.hash, "learner_hash": load(tmp_path / "driver.npz")[0].learner_hash}
     assert found == alone("--epochs", EPOCHS, "--seed", 7)
+
+
+def test_a_simulation_killed_where_an_episode_begins_keeps_the_seat_too(start, world, tmp_path):
+    words = "sim", "--name", world, "--run", "r", "--journal", tmp_path / "sim.journal"
+    sim, sensors = start(*words), start("sensors", "--name", world)
+    options = BusOptions(name=world)
+    with open_session("agent", options, "raw") as session, Bus(session, world, "agent", "raw") as bus:
+        assert bus.wait_for("sim", DEADLINE)
+        assert bus.control(Control("claim", "raw"), timeout=DEADLINE)
+        mine = lambda event: event.topic == "readings" and event.message.driver == "raw"  # noqa: E731
+        bus.put("command", Command("r", wait(bus, mine, sim, sensors).message.tick, "raw", 0.0, 0.0, "asked"))
+        wait(bus, lambda event: mine(event) and event.message.episode == 1, sim, sensors)
+        sim.kill()
+        wait(bus, lambda event: event.topic == "gone" and event.message[0] == "sim", sensors)
+        again = start(*words)
+        wait(bus, lambda event: event.topic == "alive" and event.message[0] == "sim", again, sensors)
+        reply = bus.control(Control("claim", "other"), timeout=DEADLINE)
+    assert reply is not None
+    assert reply.reason == "the seat is kept for raw"
+    assert reply.status.episode == 1
 
 
 def test_ten_swaps_leave_nothing_behind(up, world, tmp_path):

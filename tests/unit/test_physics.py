@@ -115,7 +115,7 @@ def test_a_snapshot_continues_bit_for_bit(paper: Arena):
     for command in commands:
         simulation.advance(*command, author="x")
     simulation.advance(0, 0, "x", "cap")
-    snapshot = simulation.snapshot([])
+    snapshot = simulation.snapshot([], "")
     expected = [simulation.advance(*command, author="x").hash for command in commands]
     fresh = Simulation(paper, 4, "r")
     fresh.restore(snapshot)

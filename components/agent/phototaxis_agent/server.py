@@ -49,6 +49,11 @@ class Session:
     answer: Once[Any]
 
 
+def _answering(world: World, agent: Agent) -> Once[Any]:
+    """What answers each tick of a world once; of many robots' memories nothing is inherited but what was learned."""
+    return Once(Flock(agent, world.robots)) if world.robots > 1 else Once(agent, agent.tick, agent.command)
+
+
 class Server:
     """Runs an agent against whatever run is on the bus.
 
@@ -128,8 +133,10 @@ class Server:
         elif self._seated and readings.driver and readings.author == readings.driver:
             self._replaced = self._mode != "stand by"
         self._seek(readings)
-        if isinstance(readings, Readings):
-            self._follow(session, readings)
+        if self._mode != "claim" and readings.driver:
+            self._predecessor = readings.driver
+            if isinstance(readings, Readings):
+                self._follow(session, readings)
 
     def _seek(self, readings: Readings | ReadingsOfMany) -> None:
         """Ask for the seat, as the mode says."""
@@ -147,9 +154,6 @@ class Server:
 
     def _follow(self, session: Session, readings: Readings) -> None:
         """Learn from what another driver does; a standby of its kind keeps in step with it."""
-        if self._mode == "claim" or not readings.driver:
-            return
-        self._predecessor = readings.driver
         if readings.driver != self._leader and readings.author == readings.driver:  # it has nothing to ask us any more
             self._leader = readings.driver
             self._related = self._inherit(session, probe=True)
@@ -186,7 +190,7 @@ class Server:
         except UserError as error:
             self._say(str(error))
             return False
-        session.answer = Once(agent, agent.tick, agent.command)
+        session.answer = _answering(session.world, agent)
         self._save(agent)
         return True
 
@@ -238,6 +242,8 @@ class Server:
         world = self._bus.ask_one("world")
         if world is None or world.run != run:
             return None
+        if world.robots > 1 and self._mode == "stand by":
+            raise UserError(f"a standby keeps in step with the driver of one robot; this world has {world.robots}")
         self._log.flush()
         if self._session is None:
             agent = self._make(world)
@@ -246,11 +252,7 @@ class Server:
                 agent.restore(*load(self._resume), source=str(self._resume))
         else:
             agent = self._session.agent
-        if world.robots > 1:
-            answer: Once[Any] = Once(Flock(agent, world.robots))
-        else:
-            answer = Once(agent, agent.tick, agent.command)
-        self._session = Session(world, agent, answer)
+        self._session = Session(world, agent, _answering(world, agent))
         self._driving = self._seated = self._enlisted = self._related = self._in_step = False
         self._leader = self._predecessor = ""
         self._replay(self._session)

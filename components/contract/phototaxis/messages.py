@@ -21,9 +21,9 @@ MOST = 4096
 
 Motor = Annotated[float, Meta(ge=-1, le=1)]
 Name = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$")]
-Count = Annotated[int, Meta(ge=0)]
-Seed = Annotated[int, Meta(ge=0, le=2**53)]
+Count = Annotated[int, Meta(ge=0, le=2**53)]
 """What JSON readers of all languages keep exactly."""
+Seed = Count
 
 End = Literal["", "reached", "cap", "asked"]
 """How an episode ends: it goes on, the light was reached (terminated), the step cap (truncated), by request."""
@@ -311,6 +311,16 @@ ENDS: tuple[End, ...] = ("", "reached", "cap", "asked")
 """By the number that `CommandOfMany` has for them."""
 
 
+Ticks = Annotated[list[Count], Meta(min_length=1)]
+
+
+def _check_columns(log: Any, **widths: int) -> None:
+    """Raise ValueError where a column has not so many values for each tick."""
+    for name, width in widths.items():
+        if len(getattr(log, name)) != width * len(log.tick):
+            raise ValueError(f"{name} has {len(getattr(log, name))} values for {len(log.tick)} ticks")
+
+
 class SimLog(Message):
     """Poses, commands and ended episodes of consecutive ticks, in columns."""
 
@@ -318,7 +328,7 @@ class SimLog(Message):
     seq: Count
     writer: Name
     driver: Name
-    tick: list[int]
+    tick: Ticks
     episode: list[int]
     time: Column
     x: Column
@@ -330,6 +340,9 @@ class SimLog(Message):
     """0 none, 1 front, 2 rear, 3 both."""
     ended: list[Episode]
 
+    def __post_init__(self) -> None:
+        _check_columns(self, episode=1, time=1, x=1, y=1, heading=1, left=1, right=1, contact=1)
+
 
 class SensorsLog(Message):
     """Readings of consecutive ticks, in columns; sonar and light are flattened row by row (16 and 2 a tick)."""
@@ -340,9 +353,12 @@ class SensorsLog(Message):
     sonar_model: str
     """Which model the ranges come from: "built-in", or the file of an FMU."""
     light_model: str
-    tick: list[int]
+    tick: Ticks
     sonar: Column
     light: Column
+
+    def __post_init__(self) -> None:
+        _check_columns(self, sonar=16, light=2)
 
 
 class AgentLog(Message):
@@ -354,7 +370,7 @@ class AgentLog(Message):
     learner: str
     percept: str
     """Name of the percept."""
-    tick: list[int]
+    tick: Ticks
     state: list[int]
     """Number of the percept's state."""
     action: list[int]
@@ -368,6 +384,9 @@ class AgentLog(Message):
     """With `values`: how often each state was met."""
     current: Column = field(default_factory=list)
     """At the same rate, for any percept: Q of the percept at the newest tick, 9 actions, 0 where not allowed."""
+
+    def __post_init__(self) -> None:
+        _check_columns(self, state=1, action=1, reward=1, td_error=1, temperature=1)
 
 
 class LogRequest(Message):

@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ def load(file: Path, trusted: bool) -> Any:
             module = str(data["policy_class"]["__module__"])
     except FileNotFoundError:
         raise UserError(f"{file}: there is no such file") from None
-    except (zipfile.BadZipFile, IsADirectoryError, KeyError, TypeError, ValueError):
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, OSError, KeyError, TypeError, ValueError):
         raise UserError(f"{file}: not a policy that Stable-Baselines3 has saved") from None
     if not trusted:
         raise UserError(

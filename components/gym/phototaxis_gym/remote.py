@@ -86,15 +86,20 @@ class Link:
         return self._now
 
     def answer(self, make: Callable[[str, int], Command | CommandOfMany]) -> Any:
-        """Answer the present tick with what `make` makes of its run and number; the readings of the next."""
-        before = self._now
-        if before is None or not self._closing.alive:
-            raise Error("the environment is closed" if before else "reset() comes before step()")
-        topic, command = f"{self._prefix}command", make(before.run, before.tick)
+        """Answer the newest tick with what `make` makes of its run and number; the first readings that show it obeyed.
+
+        In lockstep those are the next tick's. In real time the world does not wait: what came while nobody was
+        listening is passed over, and an answer that came late is given again.
+        """
+        if self._now is None or not self._closing.alive:
+            raise Error("the environment is closed" if self._now else "reset() comes before step()")
+        self._catch_up()
+        before, topic = self._now, f"{self._prefix}command"
+        command = make(before.run, before.tick)
         self._bus.put(topic, command)
         self._now = self._hear(
-            lambda readings: readings.run == before.run and readings.tick > before.tick,
-            lambda readings: self._bus.put(topic, command) if readings.tick == before.tick else None,
+            lambda readings: readings.run == before.run and _obeyed(command, before, readings),
+            lambda readings: self._bus.put(topic, make(before.run, readings.tick)),
         )
         return self._now
 
@@ -103,6 +108,13 @@ class Link:
         if self._closing.alive:
             self._bus.control(Control("release", self.ident), timeout=0.5)
             self._closing()
+
+    def _catch_up(self) -> None:
+        """The newest readings that have come."""
+        while (event := self._bus.receive(timeout=0)) is not None:
+            self._notice(event)
+            if event.topic == f"{self._prefix}readings" and event.message.run == self._now.run:
+                self._now = event.message
 
     def _sit(self) -> None:
         """Take the seat, if it is not ours."""
@@ -143,6 +155,13 @@ class Link:
         """Who is there."""
         if event is not None and event.topic in ("alive", "gone"):
             (self._present.add if event.topic == "alive" else self._present.discard)(event.message[0])
+
+
+def _obeyed(command: Any, before: Any, now: Any) -> bool:
+    """Whether `now` comes after the command was applied: its echo, or new episodes where it ended some."""
+    if now.tick <= before.tick:
+        return False
+    return now.episode != before.episode if any(command.end) else (now.left, now.right) == (command.left, command.right)
 
 
 class There:

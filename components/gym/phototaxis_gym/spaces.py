@@ -68,18 +68,23 @@ def _rows(variables: tuple[Any, ...]) -> np.ndarray:
     return rows
 
 
-def observation(percept: str, arena: Arena) -> Observation:
-    """The observation that `percept` names.
+def known(percept: str) -> str:
+    """The name of an observation.
 
     Raises
     ------
     gymnasium.error.Error
         when there is none; it lists those that exist.
     """
+    if percept not in PERCEPTS and percept != "sensors":
+        raise Error(f"no percept '{percept}'; there are: {', '.join([*PERCEPTS, 'sensors'])}")
+    return percept
+
+
+def observation(percept: str, arena: Arena) -> Observation:
+    """The observation that `percept` names."""
     if percept == "sensors":
         return Sensors(arena)
-    if percept not in PERCEPTS:
-        raise Error(f"no percept '{percept}'; there are: {', '.join([*PERCEPTS, 'sensors'])}")
     found, near = PERCEPTS[percept], arena.sensing.near
     return States(found, near) if all(found.sizes) else Numbers(found, near)
 

@@ -17,7 +17,7 @@ from phototaxis_sim import arenas
 from phototaxis_gym import CAP
 from phototaxis_gym.place import ManyHere, Places
 from phototaxis_gym.remote import ManyThere
-from phototaxis_gym.spaces import MOTORS, actions, limit, observation, rewards
+from phototaxis_gym.spaces import MOTORS, actions, known, limit, observation, rewards
 
 SEEDS = 2**31
 REACHED, CAPPED = ENDS.index("reached"), ENDS.index("cap")
@@ -54,6 +54,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         if num_envs < 1:
             raise Error(f"num_envs {num_envs}: at least one robot is needed")
         self.num_envs, self._cap = num_envs, limit(cap)
+        self._reward, self.single_action_space = rewards(reward, known(percept)), actions(action)
         try:
             self._place: Places = (
                 ManyThere(connect, world, timeout, num_envs) if connect else ManyHere(arenas.load(arena or "paper"))
@@ -61,8 +62,8 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         except UserError as error:
             raise Error(str(error)) from None
         arena_ = self._place.arena
-        self._observe, self._reward = observation(percept, arena_), rewards(reward, percept)
-        self.single_observation_space, self.single_action_space = self._observe.space, actions(action)
+        self._observe = observation(percept, arena_)
+        self.single_observation_space = self._observe.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._discrete = action == "discrete"

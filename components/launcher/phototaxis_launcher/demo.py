@@ -37,7 +37,7 @@ within {found["cap"]} steps. The paper reports "upwards of 80%" for this system 
 
   watched at  {run.url or "(no viewer)"}
   recording   {result["recording"]}
-              look again: {Path(sys.executable).parent / "rerun"} {result["recording"]}
+              look again: {Path(sys.executable).parent / "phototaxis"} view {result["recording"]}
   checkpoint  {result["checkpoint"]}
               measure again: {Path(sys.executable).parent / "phototaxis"} evaluate {result["checkpoint"]}"""
     )

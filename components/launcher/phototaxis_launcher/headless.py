@@ -1,6 +1,5 @@
 """A Rerun viewer without a display: what it shows, as pictures and as its own words."""
 
-import socket
 import subprocess
 import tempfile
 import time
@@ -9,8 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import rerun_cli
 from phototaxis.errors import ComponentFailed
+from phototaxis.ports import free_ports
+from phototaxis.viewer import rerun_program
 from PIL import Image
 from rerun.experimental import ViewerClient
 
@@ -29,13 +29,11 @@ def viewer(source: str) -> Iterator[Any]:
     ComponentFailed
         when it does not come up (it needs a Vulkan driver; Mesa's for software rendering will do).
     """
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = str(probe.getsockname()[1])
+    port = str(*free_ports(1))
     what = ["--connect", source] if source.startswith("rerun+") else [source]
-    program = Path(rerun_cli.__file__).parent / "rerun"
     words = ["--headless", "--bind", "127.0.0.1", "--port", port, "--window-size", SIZE, *what]
     with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen([program, *words], stdout=said, stderr=said)
+        process = subprocess.Popen([rerun_program(), *words], stdout=said, stderr=said)
         try:
             yield _connected(process, port, said)
         finally:

@@ -27,6 +27,7 @@ class Child:
     name : names its log file, and it in messages.
     module : Python module that is its program.
     label : if given, each start gets a name on the bus that begins with it.
+    may_leave : whether it may end by itself, without an error; otherwise it is restarted then too.
 
     Attributes
     ----------
@@ -34,8 +35,10 @@ class Child:
     left : it ended by itself, without an error.
     """
 
-    def __init__(self, name: str, module: str, arguments: list[str], folder: Path, label: str = ""):
-        self.name, self.label = name, label
+    def __init__(
+        self, name: str, module: str, arguments: list[str], folder: Path, label: str = "", may_leave: bool = False
+    ):
+        self.name, self.label, self._may_leave = name, label, may_leave
         self._module, self._arguments = module, arguments
         self._log = folder / f"{name}.log"
         self.idents: list[str] = []
@@ -59,7 +62,7 @@ class Child:
             )
 
     def watch(self) -> bool:
-        """Restart the process if it has died; whether it had to. One that ended without an error has `left`.
+        """Restart the process if it has died; whether it had to. One that may leave and did has `left`.
 
         Raises
         ------
@@ -71,7 +74,7 @@ class Child:
         if self.process is None or self.process.poll() is None:
             return False
         code = self.process.returncode
-        if code == 0:
+        if code == 0 and self._may_leave:
             self.left = True
             return False
         if code in MENDABLE:

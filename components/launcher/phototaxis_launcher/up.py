@@ -16,10 +16,10 @@ from phototaxis.errors import ComponentFailed, UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import MOST, Launch, LaunchReply, Seed, Status, run_name
 from phototaxis.options import Parser, add_options, convert, flags, peek
+from phototaxis.ports import free_ports
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
 
-from phototaxis_launcher.ports import free_ports
 from phototaxis_launcher.processes import Child
 from phototaxis_launcher.progress import Progress
 
@@ -101,13 +101,13 @@ class Run:
                 self.url = viewer_url(web, grpc)
 
     def _child(self, role: str, *arguments: str) -> Child:
-        return Child(role, f"phototaxis_{role}", list(arguments), self.folder)
+        return Child(role, f"phototaxis_{role}", list(arguments), self.folder, may_leave=role == "sim")
 
     def _agent(self, words: list[str], *more: str) -> Child:
         """One more agent, with a checkpoint of its own."""
         name = f"agent-{len(self.agents) + 1}" if self.agents else "agent"
         arguments = [*self._bus, f"--checkpoint={self._checkpoint(name)}", *words, *more]
-        child = Child(name, "phototaxis_agent", arguments, self.folder, label=_learner(words))
+        child = Child(name, "phototaxis_agent", arguments, self.folder, label=_learner(words), may_leave=True)
         self.agents.append(child)
         return child
 
@@ -167,7 +167,7 @@ class Run:
         for child in self._all():
             try:
                 if child.watch():
-                    progress.say(f"{child.name} died and was restarted; see {self.folder}")
+                    progress.say(f"{child.name} ended and was restarted; see {self.folder}")
             except UserError as error:
                 if not self._answer(child, LaunchReply(str(error))):
                     raise

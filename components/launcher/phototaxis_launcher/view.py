@@ -14,8 +14,9 @@ import msgspec
 from msgspec import Meta
 from phototaxis.errors import ComponentFailed, Unavailable, UserError
 from phototaxis.options import parse
+from phototaxis.ports import find_ports
 from phototaxis.recordings import recordings
-from phototaxis.viewer import viewer_url
+from phototaxis.viewer import rerun_program, viewer_url
 
 PORT = Annotated[int, Meta(ge=1, le=65535)]
 
@@ -92,7 +93,7 @@ def find(run: str, folder: Path) -> Path:
 
 def whole(file: Path, folder: Path) -> Path:
     """The recording itself, or where its recorder was killed or still writes, a copy of all that can be read of it."""
-    rrd = [rerun(), "rrd"]
+    rrd = [rerun_program(), "rrd"]
     if subprocess.run([*rrd, "verify", file], capture_output=True, check=False).returncode == 0:
         return file
     with file.open("rb") as found:
@@ -106,24 +107,13 @@ def whole(file: Path, folder: Path) -> Path:
     return copy
 
 
-def rerun() -> Path:
-    """Rerun's own program; the script of the same name would leave it an orphan."""
-    import rerun_cli
-
-    return Path(rerun_cli.__file__).parent / "rerun"
-
-
 def show(file: str, options: Options, web: bool) -> int:
     """A finished recording, until Ctrl-C or until the window is closed."""
     if options.picture:
         return draw(file, options)
     if not web:
         return native(file)
-    for port, flag in ((options.grpc_port, "--grpc-port"), (options.web_port, "--web-port")):
-        try:
-            socket.create_server(("127.0.0.1", port)).close()
-        except OSError:
-            raise Unavailable(f"port {port} on 127.0.0.1 is not free; choose another with {flag}") from None
+    find_ports("127.0.0.1", {"--grpc-port": options.grpc_port, "--web-port": options.web_port})
     print(f"{file}: look at {viewer_url(options.web_port, options.grpc_port)} (Ctrl-C ends)", file=sys.stderr)
     ports = ("--port", str(options.grpc_port), "--web-viewer-port", str(options.web_port))
     return native("--serve-web", "--bind", "127.0.0.1", *ports, file)
@@ -139,7 +129,7 @@ def draw(source: str, options: Options) -> int:
 
 def native(*words: str) -> int:
     """Run Rerun's program until it ends, or Ctrl-C."""
-    viewer = subprocess.Popen([rerun(), *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    viewer = subprocess.Popen([rerun_program(), *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     signal.signal(signal.SIGTERM, lambda *_: viewer.terminate())
     try:
         _, errors = viewer.communicate()

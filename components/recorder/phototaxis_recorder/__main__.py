@@ -11,6 +11,7 @@ from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse
+from phototaxis.ports import find_ports
 from phototaxis.recordings import write_summary
 from phototaxis.viewer import viewer_url
 
@@ -35,14 +36,14 @@ def main(argv: Sequence[str] | None = None) -> None:
     import rerun as rr
 
     from phototaxis_recorder.server import Server
-    from phototaxis_recorder.sinks import Page, complete, fresh_file, open_recording, probe
+    from phototaxis_recorder.sinks import Page, complete, fresh_file, open_recording
     from phototaxis_recorder.translate import Translator
 
     output = Path(options.output)
     if not output.parent.is_dir():
         raise UserError(f"--output {output}: there is no folder {output.parent}")
-    grpc_port = probe(options.bind, options.grpc_port, "--grpc-port")
-    web_port = probe(options.bind, options.web_port, "--web-port") if options.web_port >= 0 else -1
+    page_port = {"--web-port": options.web_port} if options.web_port >= 0 else {}
+    grpc_port, web_port = [*find_ports(options.bind, {"--grpc-port": options.grpc_port, **page_port}), -1][:2]
     recording: list[rr.RecordingStream] = []
     file = output
 

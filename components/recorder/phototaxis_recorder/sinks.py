@@ -1,37 +1,17 @@
 """Where a recording goes: a file, the live gRPC server, and a page with the web viewer."""
 
 import os
-import socket
 import subprocess
 from pathlib import Path
 
 import rerun as rr
-import rerun_cli
-from phototaxis.errors import Unavailable
 from phototaxis.messages import World
+from phototaxis.viewer import rerun_program
 
 from phototaxis_recorder.layout import blueprint
 
 LARGE = 250_000_000
 """Bytes above which a recording is not rewritten at its end: that takes more than twice as much memory."""
-RERUN = Path(rerun_cli.__file__).parent / "rerun"
-
-
-def probe(host: str, port: int, flag: str) -> int:
-    """The port if it is free, or a free one for 0. Rerun itself would go on without a word.
-
-    Raises
-    ------
-    Unavailable
-        when it is taken.
-    """
-    try:
-        with socket.create_server((host, port)) as server:
-            return server.getsockname()[1]
-    except OSError as error:
-        raise Unavailable(
-            f"port {port} on {host} is not free ({error.strerror}); choose another with {flag} (0: any free one)"
-        ) from None
 
 
 def open_recording(world: World, file: Path, host: str, grpc_port: int, memory: str) -> rr.RecordingStream:
@@ -63,7 +43,7 @@ def complete(file: Path) -> None:
     if not file.exists() or file.stat().st_size > LARGE:
         return
     part = file.with_suffix(".part")
-    command = [RERUN, "rrd", "optimize", file, "-o", part]
+    command = [rerun_program(), "rrd", "optimize", file, "-o", part]
     if subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False).returncode == 0:
         os.replace(part, file)
     else:
@@ -78,7 +58,7 @@ class Page:
 
     def __init__(self, host: str, port: int, grpc_port: int):
         source = f"rerun+http://localhost:{grpc_port}/proxy"
-        serve = [RERUN, "--serve-web", "--bind", host, "--web-viewer-port", str(port), source]
+        serve = [rerun_program(), "--serve-web", "--bind", host, "--web-viewer-port", str(port), source]
         self._process = subprocess.Popen(
             ["/bin/sh", "-c", '"$@" & cat >/dev/null; kill $!; wait', "page", *serve],
             stdin=subprocess.PIPE,

@@ -172,11 +172,13 @@ class Translator:
 
     def _learned(self, chunk: AgentLog) -> None:
         self._at(chunk.tick[-1])
-        log, percept = self._recording, PERCEPTS[chunk.percept]
+        log, percept = self._recording, PERCEPTS.get(chunk.percept)
         if len(chunk.current) == len(ACTIONS):
             rr.log("learner/current", rr.BarChart(np.array(chunk.current), color=BLUE), recording=log)
-        table, visits = np.reshape(chunk.values, (-1, len(ACTIONS))).astype(np.float32), np.array(chunk.visits)
-        if math.prod(percept.sizes) == len(table) == len(visits) > 0:
+        states = 0 if percept is None else math.prod(percept.sizes)
+        if percept is not None and len(chunk.visits) == states > 0 and len(chunk.values) == states * len(ACTIONS):
+            visits = np.array(chunk.visits)
+            table = np.reshape(chunk.values, (states, len(ACTIONS))).astype(np.float32)
             rr.log("learner/table", rr.Tensor(table, dim_names=["state", "action"]), recording=log)
             rr.log("learner/visits", rr.BarChart(visits, color=BLUE), recording=log)
             moving, still = policy.arrows(percept, table, visits)

@@ -17,6 +17,7 @@ from phototaxis.messages import (
     SimLog,
     State,
     StateOfMany,
+    World,
 )
 from phototaxis.protocol import Once
 from phototaxis.topics import TOPICS
@@ -43,7 +44,7 @@ class Server:
 
     def __init__(self, bus: Bus, make: Choice):
         self._bus, self._make = bus, make
-        self._many: tuple[str, Once[ReadingsOfMany]] | None = None
+        self._many: tuple[World, Once[ReadingsOfMany]] | None = None
         self._models = (BuiltIn.name, BuiltIn.name)
         self._session: Session | None = None
         self._newest = -1
@@ -83,13 +84,13 @@ class Server:
             self._log.add((state.run, state.tick, readings.sonar, readings.light), time.monotonic())
 
     def _answer_many(self, state: StateOfMany) -> None:
-        if self._many is None or self._many[0] != state.run:
+        if self._many is None or self._many[0].run != state.run:
             world = self._bus.ask_one("world")
             if world is None or world.run != state.run:
                 return None
             self._log.flush()
             self._newest = -1
-            self._many = state.run, Once(SuiteOfMany(world, self._make))
+            self._many = world, Once(SuiteOfMany(world, self._make))
         try:
             readings = self._many[1](state)
         except Refused as why:
@@ -100,7 +101,7 @@ class Server:
         self._bus.put("crowd/readings", readings)
         if state.tick > self._newest:
             self._newest = state.tick
-            robots = len(state.left) // 8
+            robots = self._many[0].robots
             sonar, light = unpack(readings.sonar, robots, 16), unpack(readings.light, robots, 2)
             self._log.add((state.run, state.tick, sonar[:, 0].tolist(), light[:, 0].tolist()), time.monotonic())
         return None

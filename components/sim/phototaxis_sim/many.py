@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from phototaxis.arena import Arena
 from phototaxis.columns import COUNT, FLAG, pack, unpack
-from phototaxis.messages import ENDS, CommandOfMany, Refused, State, StateOfMany, World
+from phototaxis.messages import ENDS, CommandOfMany, End, Episode, Refused, State, StateOfMany, World
 
 from phototaxis_sim.crowd import Crowd
 from phototaxis_sim.physics import Physics, Pose
@@ -27,9 +27,8 @@ class SimulationOfMany:
     episode : (N,) count of each robot's episodes.
     state : the present tick as it is published, after `advance`; `driver` is filled in by whoever keeps the seat.
     outcomes : whether the light was reached, for each episode that ended in the last `advance`.
+    ended : the first robot's episode that ended in the last `advance`, or None.
     """
-
-    ended = None
 
     def __init__(
         self, arena: Arena, seed: int, run: str, epochs: int = 0, robots: int = 1, seeds: Sequence[int] | None = None
@@ -40,7 +39,10 @@ class SimulationOfMany:
         self.episode, self.tick, self.epoch = np.zeros(robots, int), 0, 0
         self.episodes = self.reached = 0
         self.outcomes: list[bool] = []
+        self.ended: Episode | None = None
+        self._began = 0
         starts = [self._placement(row) for row in range(robots)]
+        self._start = starts[0]
         self._groups = [slice(start, start + TOGETHER) for start in range(0, robots, TOGETHER)]
         self._crowds = [Crowd(arena, starts[group]) for group in self._groups]
         self._chain = b"\0" * 8
@@ -67,8 +69,17 @@ class SimulationOfMany:
         Refused
             when a column is not of this many robots, or a command is out of range.
         """
-        self.drive(*self._columns(left, right, end))
+        motors, ends = self._columns(left, right, end)
+        self.ended = self._ending(ENDS[ends[0]], author)
+        self.drive(motors, ends)
+        if self.ended is not None:
+            self._began, self._start = self.tick, Pose(*self.poses[0].tolist())
         return self._report(author)
+
+    def _ending(self, end: End, author: str) -> Episode | None:
+        """The first robot's episode, if it ends now."""
+        run, number, steps = self.world.run, int(self.episode[0]), self.tick - self._began
+        return Episode(run, number, self.tick, steps, end, author, *self._start) if end else None
 
     def check(self, command: CommandOfMany) -> None:
         """Raise Refused when a column is not of this many robots, or a command is out of range."""

@@ -79,9 +79,9 @@ class Server:
         self._mean_rate = 0.0
         self._ended: list[Any] = []
         self._log = Chunks(bus, "log/sim", self._chunk)
+        self._seat = Seat()
         if journal is not None:
-            self._continue(journal)
-        self._seat = Seat(heir=simulation.state.author)
+            self._seat.heir = self._continue(journal)
         self._heir_until = time.monotonic() + HEIR_WITHIN
 
     def serve(self) -> None:
@@ -337,21 +337,25 @@ class Server:
         )  # fmt: skip
 
     def _header(self) -> bytes:
-        return msgspec.msgpack.encode(self._sim.snapshot(list(self._recent)))
+        return msgspec.msgpack.encode(self._sim.snapshot(list(self._recent), self._seat.driver))
 
-    def _continue(self, journal: Journal) -> None:
-        """Restore what the journal holds of this run, or begin a new journal."""
+    def _continue(self, journal: Journal) -> str:
+        """Restore what the journal holds of this run, or begin a new journal; who drove last."""
         frames = journal.read()
         snapshot = msgspec.msgpack.decode(frames[0], type=Snapshot) if frames else None
         if snapshot is not None and re.fullmatch(re.escape(self._root) + r"\.[0-9a-f]{4}", snapshot.run):
             self._sim = self._sim.anew(snapshot.seed, snapshot.run)  # it was begun later, by request
         if snapshot is None or snapshot.run != self._sim.world.run:
             journal.begin(self._header())
-            return
+            return ""
         self._sim.restore(snapshot)
         self._recent.extend(snapshot.recent)
         journal.begin(frames[0])
+        driver = snapshot.driver
         for frame in frames[1:]:
             journal.append(frame)
             self._record(self._sim.state)
-            self._advance(msgspec.msgpack.decode(frame, type=Entry))
+            entry = msgspec.msgpack.decode(frame, type=Entry)
+            self._advance(entry)
+            driver = entry.author
+        return driver

@@ -27,6 +27,8 @@ class Snapshot(Struct):
     """The hash before that tick."""
     recent: list[bool]
     """Whether the last ended episodes reached the light."""
+    driver: str
+    """Who held the seat."""
 
 
 class Simulation:
@@ -97,7 +99,7 @@ class Simulation:
             self.state = self._report(self._physics.drive(left, right), left, right, author)
         return self.state
 
-    def snapshot(self, recent: list[bool]) -> Snapshot:
+    def snapshot(self, recent: list[bool], driver: str) -> Snapshot:
         """What `restore` needs to begin the present episode again; only at its first tick."""
         return Snapshot(
             self.world.run,
@@ -109,6 +111,7 @@ class Simulation:
             self.reached,
             self._before,
             recent,
+            driver,
         )
 
     def restore(self, at: Snapshot) -> None:

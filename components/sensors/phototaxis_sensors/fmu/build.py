@@ -48,6 +48,20 @@ def build(example: Example, version: Version, file: Path, sources_only: bool = F
             raise UserError(f"{file}: {error.strerror}") from None
 
 
+def compiled(file: Path) -> bytes:
+    """An FMU file with the library for this machine, made from its sources.
+
+    Raises
+    ------
+    UserError
+        as in `compile_sources`.
+    """
+    with TemporaryDirectory(prefix="phototaxis-fmu-") as folder:
+        archive = Path(shutil.copyfile(file, Path(folder) / "compiled.fmu"))
+        compile_sources(archive)
+        return archive.read_bytes()
+
+
 def compile_sources(archive: Path) -> None:
     """Add the library for this machine, made from its sources, to an FMU file.
 

@@ -1,6 +1,9 @@
 """FMUs as the sensors of many robots at once: all instances in one process, stepped together."""
 
+import sys
+
 import numpy as np
+from phototaxis.errors import ComponentFailed
 from phototaxis.messages import World
 
 from phototaxis_sensors.crowd import CrowdSuite
@@ -32,11 +35,14 @@ class Crew:
 
 
 class FmuCrowd(CrowdSuite):
-    """Readings of N robots, some of them from FMUs; for one episode, tick by tick."""
+    """Readings of N robots, some of them from FMUs; for one episode, tick by tick.
 
-    def __init__(self, world: World, sonar: Crew | None, light: Crew | None):
+    With `fallback` the built-in model takes the place of an FMU that keeps failing; else that is an error.
+    """
+
+    def __init__(self, world: World, sonar: Crew | None, light: Crew | None, fallback: bool):
         super().__init__(world)
-        self._sonar_crew, self._light_crew, self._tick = sonar, light, 0
+        self._sonar_crew, self._light_crew, self._fallback, self._tick = sonar, light, fallback, 0
 
     def __call__(self, tick: int, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Sonars (16, N) in m and lights (2, N) in 0..1 at poses (N, 3)."""
@@ -48,7 +54,11 @@ class FmuCrowd(CrowdSuite):
         if self._sonar_crew is None:
             return ranges
         farthest = self._arena.robot.sonar_range
-        found = self._sonar_crew(self._tick, np.minimum(ranges, farthest).T)
+        try:
+            found = self._sonar_crew(self._tick, np.minimum(ranges, farthest).T)
+        except ComponentFailed as error:
+            self._sonar_crew = self._without(error)
+            return ranges
         return np.clip(found.reshape(len(poses), -1).T, 0.0, farthest)
 
     def _light(self, poses: np.ndarray) -> np.ndarray:
@@ -56,8 +66,18 @@ class FmuCrowd(CrowdSuite):
         if crew is None:
             return super()._light(poses)
         ours = super()._light(poses).T if crew.ports == ["raw"] else self._sights(poses, crew.ports)
-        found = crew(self._tick, ours).reshape(len(poses), 2, -1)
+        try:
+            found = crew(self._tick, ours).reshape(len(poses), 2, -1)
+        except ComponentFailed as error:
+            self._light_crew = self._without(error)
+            return super()._light(poses)
         return np.clip(found.sum(axis=2).T, 0.0, 1.0)
+
+    def _without(self, error: ComponentFailed) -> None:
+        """Say that an FMU is given up; raise the error where that was not asked for."""
+        if not self._fallback:
+            raise error
+        print(f"sensors: {error}; the built-in model takes its place", file=sys.stderr, flush=True)
 
     def _sights(self, poses: np.ndarray, ports: list[str]) -> np.ndarray:
         """What the instances see: (robot, sensor, lamp, port)."""

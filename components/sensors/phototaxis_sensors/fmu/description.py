@@ -1,6 +1,7 @@
 """Reads an FMU and says clearly what is wrong with it, before any of its code runs."""
 
 import zipfile
+import zlib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +12,8 @@ from phototaxis.errors import UserError
 
 LARGEST = 2_000_000_000
 """Bytes that an FMU may have when unpacked."""
+UNPACKING = (zipfile.BadZipFile, zlib.error, RuntimeError, OSError)
+"""What a damaged, an encrypted or an exotic archive, or a full disk, raises."""
 
 
 class Fmu(NamedTuple):
@@ -59,7 +62,10 @@ def read(path: str) -> Fmu:
             size = sum(one.file_size for one in archive.infolist())
             if "modelDescription.xml" not in members:
                 raise UserError(f"{path}: not an FMU: it has no modelDescription.xml")
-            version = _version(path, archive)
+            try:
+                version = _version(path, archive)
+            except UNPACKING as error:
+                raise UserError(f"{path}: cannot be unpacked: {error}") from None
     except FileNotFoundError:
         raise UserError(f"{path}: there is no such file") from None
     except (zipfile.BadZipFile, IsADirectoryError):

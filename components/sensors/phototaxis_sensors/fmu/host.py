@@ -9,13 +9,13 @@ import sys
 import time
 import zipfile
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import msgspec
 
-from phototaxis_sensors.fmu.build import compile_sources
-from phototaxis_sensors.fmu.description import Fmu
+from phototaxis_sensors.fmu.description import UNPACKING, Fmu
 from phototaxis_sensors.fmu.wiring import Wiring, size
 from phototaxis_sensors.fmu.worker import BEGIN, HEAD, LENGTH, STEP, Setup
 
@@ -47,14 +47,14 @@ class Host:
     instances : how many; all are stepped together.
     period : length of a step, s.
     timeout : seconds after which a silent process is killed.
-    allow_compile : build the library where the FMU has none.
+    archive : the FMU's archive where it is not that of its file.
     """
 
     def __init__(
-        self, fmu: Fmu, wiring: Wiring, instances: int, period: float, timeout: float, allow_compile: bool = False
+        self, fmu: Fmu, wiring: Wiring, instances: int, period: float, timeout: float, archive: bytes | None = None
     ):
         self._fmu, self._wiring, self._period, self._timeout = fmu, wiring, period, timeout
-        self._instances, self._allow_compile = instances, allow_compile
+        self._instances, self._archive = instances, archive
         self._values_in = sum(map(size, wiring.inputs))
         self._values_out = wiring.width
         self._request = struct.Struct(f"<qq{self._values_in * instances}d")
@@ -138,14 +138,11 @@ class Host:
         )  # fmt: skip
 
     def _unpack(self, folder: Path) -> None:
-        file = self._fmu.file
-        with TemporaryDirectory(prefix="phototaxis-fmu-") as aside:
-            if not self._fmu.compiled and self._allow_compile:
-                file = Path(aside) / "compiled.fmu"
-                file.write_bytes(self._fmu.file.read_bytes())
-                compile_sources(file)
-            with zipfile.ZipFile(file) as archive:
+        try:
+            with zipfile.ZipFile(self._fmu.file if self._archive is None else BytesIO(self._archive)) as archive:
                 archive.extractall(folder)  # it strips what would lead out of the folder
+        except UNPACKING as error:
+            raise Failed(f"cannot be unpacked: {error}") from None
 
     def _write(self, data: bytes) -> None:
         try:

@@ -9,6 +9,7 @@ from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
 
+from phototaxis_sensors.fmu.build import compiled
 from phototaxis_sensors.fmu.crowd import Crew, FmuCrowd
 from phototaxis_sensors.fmu.description import Fmu, read, require_library
 from phototaxis_sensors.fmu.host import Failed, Host, Team, stay_on_one_cpu
@@ -31,6 +32,8 @@ class Wired(NamedTuple):
     """light or sonar"""
     fmu: Fmu
     wiring: Wiring
+    archive: bytes | None
+    """The FMU with a library that was compiled for it; None where it brought one."""
 
     @property
     def label(self) -> str:
@@ -60,7 +63,7 @@ class FmuSensors:
             fmu = read(files[kind])
             wiring = connect(fmu, SUITES[kind], names[kind], parameters[kind])
             require_library(fmu, options.allow_compile)
-            self._wired[kind] = Wired(kind, fmu, wiring)
+            self._wired[kind] = Wired(kind, fmu, wiring, None if fmu.compiled else compiled(fmu.file))
         self._running: list[Host | Team] = []
 
     def try_out(self, period: float = 0.1) -> None:
@@ -94,7 +97,7 @@ class FmuSensors:
             self._warn(wired, arena.motion.control_period)
             host = self._host(wired, count * each, arena.motion.control_period)
             crews[kind] = Crew(Stepped(host, wired.wiring, wired.label), wired.wiring)
-        return FmuCrowd(world, crews.get("sonar"), crews.get("light"))
+        return FmuCrowd(world, crews.get("sonar"), crews.get("light"), self._options.fmu_fallback)
 
     def close(self) -> None:
         """End the FMUs' processes."""
@@ -103,7 +106,7 @@ class FmuSensors:
 
     def _host(self, wired: Wired, instances: int, period: float) -> Host | Team:
         options = self._options
-        rest = period, options.fmu_timeout, options.allow_compile
+        rest = period, options.fmu_timeout, wired.archive
         if wired.fmu.once and instances > PROCESSES:
             raise UserError(
                 f"{wired.fmu.file}: a process can have it once, and {instances} instances are needed; "

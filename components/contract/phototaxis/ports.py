@@ -1,0 +1,34 @@
+"""Ports of this machine that nothing listens on."""
+
+import socket
+from collections.abc import Mapping
+from contextlib import ExitStack
+
+from phototaxis.errors import Unavailable
+
+
+def free_ports(count: int) -> list[int]:
+    """`count` different ports of the loopback interface."""
+    return find_ports("127.0.0.1", {str(number): 0 for number in range(count)})
+
+
+def find_ports(host: str, wanted: Mapping[str, int]) -> list[int]:
+    """A free TCP port for each option: the one that it names, or any for 0. All are held until the last is found.
+
+    Raises
+    ------
+    Unavailable
+        when one is taken, be it by another of the options.
+    """
+    found: list[int] = []
+    with ExitStack() as held:
+        for flag, port in wanted.items():
+            try:
+                server = held.enter_context(socket.create_server((host, port)))
+            except OSError as error:
+                raise Unavailable(
+                    f"port {port} on {host} is not free ({error.strerror}); "
+                    f"choose another with {flag} (0: any free one)"
+                ) from None
+            found.append(server.getsockname()[1])
+    return found
