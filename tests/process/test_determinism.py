@@ -47,13 +47,22 @@ def test_the_rich_percept_too(up):
     assert hashes(result(up(*words, "--no-recorder"))) == hashes(json.loads(done.stdout))
 
 
-@pytest.mark.parametrize("victims", [["sensors", "recorder"], ["agent"], ["sim"], ["agent", "sim"]])
-def test_killed_components_are_restarted_and_change_nothing(up, alone, world, victims):
+@pytest.mark.parametrize(
+    ("victims", "number"),
+    [
+        (["sensors", "recorder"], signal.SIGKILL),
+        (["sensors", "recorder"], signal.SIGTERM),
+        (["agent"], signal.SIGKILL),
+        (["sim"], signal.SIGKILL),
+        (["agent", "sim"], signal.SIGKILL),
+    ],
+)
+def test_killed_components_are_restarted_and_change_nothing(up, alone, world, victims, number):
     launcher = up("--epochs", EPOCHS, "--seed", 7)
     with observer(world) as bus:
-        for number, victim in enumerate(victims):
-            wait_status(bus, lambda status, number=number: status.epoch > 500 * (number + 1), launcher)
-            os.kill(children(launcher.popen.pid)[victim], signal.SIGKILL)
+        for count, victim in enumerate(victims, 1):
+            wait_status(bus, lambda status, count=count: status.epoch > 500 * count, launcher)
+            os.kill(children(launcher.popen.pid)[victim], number)
     found = result(launcher)
     assert found["restarts"] == dict.fromkeys(victims, 1)
     assert hashes(found) == alone

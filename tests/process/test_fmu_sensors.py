@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -131,6 +132,20 @@ def test_what_is_not_even_an_archive(tmp_path):
     refused("not an FMU", "fmu", "info", tmp_path)
 
 
+def test_an_archive_that_cannot_be_unpacked(fmu: Built, tmp_path):
+    whole = fmu("light", 3).read_bytes()
+    with zipfile.ZipFile(fmu("light", 3)) as archive:
+        for name, text in (
+            ("binaries/", "cannot be unpacked: Bad CRC-32"),
+            ("modelDescription.xml", "cannot be unpacked"),
+        ):
+            member = next(one for one in archive.infolist() if one.filename.startswith(name) and one.file_size)
+            at = member.header_offset + 30 + len(member.filename) + member.compress_size // 2
+            damaged = tmp_path / "damaged.fmu"
+            damaged.write_bytes(whole[:at] + bytes([whole[at] ^ 255]) + whole[at + 1 :])
+            refused(text, "sensors", "--light-fmu", damaged)
+
+
 SAID = {
     "error": "returned an error at tick",
     "discard": "returned discard at tick",
@@ -222,6 +237,10 @@ def test_the_built_in_model_takes_over_only_if_asked(fmu: Built, up):
     ended = up("--epochs", 300, *faulty, "--no-recorder")
     assert ended.end() == 4
     assert "light FMU faulty3.fmu: crashed with SIGSEGV" in ended.stderr
+    measured = phototaxis("evaluate", asked["checkpoint"], "--placements", 20, *faulty, "--fmu-fallback")
+    assert measured.returncode == 0, measured.stderr
+    assert "at tick 19, after 3 restarts; the built-in model takes its place" in measured.stderr
+    assert phototaxis("evaluate", asked["checkpoint"], "--placements", 20, *faulty).returncode == 4
 
 
 def test_nobody_outlives_killed_sensors(fmu: Built, start, world):

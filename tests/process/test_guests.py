@@ -50,7 +50,9 @@ def test_the_foreign_example_drives_to_the_light_and_keeps_the_contract(start, w
     options = BusOptions(name=world, connect=[router])
     with open_session("observer", options) as session, Bus(session, world, "observer", "test") as bus:
         status = wait_status(bus, lambda status: status.reached >= 5, sim, sensors, guest)
-    assert status.driver == "chaser"
+        assert status.driver == "chaser"
+        assert bus.control(Control("begin", seed=5), timeout=20)
+        wait_status(bus, lambda now: now.run != status.run and now.reached >= 2, sim, sensors, guest)
 
 
 def test_our_own_agent_keeps_the_contract(start, world):

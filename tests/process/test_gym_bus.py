@@ -7,6 +7,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -195,3 +196,33 @@ def test_a_program_that_forgets_to_close_ends_and_frees_the_seat(system, world):
     assert done.returncode == 0, done.stderr
     with observer(world) as bus:
         wait_status(bus, lambda status: not status.driver, system["sim"])
+
+
+def test_in_real_time_a_step_shows_what_its_action_did(start, world):
+    """However long a learner takes: what came meanwhile is passed over, an answer that was late is given again."""
+    system = start("sim", "--name", world, "--speed", 20), start("sensors", "--name", world)
+    with observer(world) as bus:
+        wait_status(bus, lambda status: any(who.startswith("sensors/") for who in status.alive), *system)
+        environment = make(world, action="continuous", percept="sensors")
+        environment.reset(seed=1)
+        place: Any = environment.unwrapped
+        for motors in ((0.25, -0.25), (-0.25, 0.25), (0.5, 0.25)):
+            before = place.step(np.array(motors, np.float32))[4]["tick"]
+            pause = wait_status(bus, lambda status, before=before: status.tick > before + 20, *system)
+            _, _, _, _, info = environment.step(np.array([1.0, motors[0]], np.float32))
+            assert info["tick"] > pause.tick, "not one of those that were waiting"
+            assert (place._readings.left, place._readings.right) == (1.0, motors[0])
+        number = info["episode_number"]
+        wait_status(bus, lambda status: status.tick > info["tick"] + 20, *system)
+        _, info = environment.reset()
+        assert info["episode_number"] == number + 1
+        environment.close()
+
+
+@pytest.mark.parametrize("options", [{"percept": "x"}, {"reward": "x"}, {"action": "x"}, {"cap": 0}])
+def test_a_wrong_option_is_said_before_the_bus_is_entered(options: dict[str, Any]):
+    line = r"no percept|no reward|no actions|at least one step"
+    with pytest.raises(Error, match=line):
+        gymnasium.make(NAME, connect="tcp/127.0.0.1:1", **options)
+    with pytest.raises(Error, match=line):
+        gymnasium.make_vec(NAME, num_envs=2, connect="tcp/127.0.0.1:1", **options)

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -10,6 +11,7 @@ import pytest
 from fmus import Built
 from gymnasium.error import Error, InvalidAction
 from phototaxis.bus import Bus
+from phototaxis.checkpoint import load
 from phototaxis.columns import FLAG, pack
 from phototaxis.messages import CommandOfMany, Control
 from phototaxis.session import BusOptions, open_session
@@ -67,6 +69,9 @@ def test_one_learner_drives_them_all_and_killed_sensors_change_nothing(up, world
     ticks = list(range(whole["ticks"] + 1))
     assert sorted(series(whole["recording"], "/world/trail", "Points2D:positions")) == ticks, "the first is recorded"
     assert sorted(series(whole["recording"], "/plots/reward", "Scalars:scalars")) == ticks
+    said = [text[0] for _, text in sorted(series(whole["recording"], "/episodes", "TextLog:text").items())]
+    assert any(text.startswith("episode 0: ") for text in said)
+    assert len(series(whole["recording"], "/plots/success/rate", "Scalars:scalars")) > 2
     launcher = up(*words, "--no-recorder")
     with observer(world) as bus:
         wait_status(bus, lambda status: status.tick > 200, launcher)
@@ -76,6 +81,27 @@ def test_one_learner_drives_them_all_and_killed_sensors_change_nothing(up, world
     assert (found["state_hash"], found["learner_hash"]) == (whole["state_hash"], whole["learner_hash"])
     measured = phototaxis("evaluate", whole["checkpoint"], "--placements", 100, "--json")
     assert measured.returncode == 0, measured.stderr
+
+
+def test_a_successor_of_its_kind_knows_what_the_driver_of_many_knew(up, world):
+    words = "--robots", 8, "--epochs", 6000, "--seed", 3, "--learner", "qtable", "--no-recorder"
+    launcher = up(*words, "--swap", "200:qtable,400:mirror")
+    found = result(launcher)
+    assert [(one["from_tick"], one["learner"]) for one in found["drivers"]] == [
+        (0, "qtable"), (200, "qtable"), (400, "mirror"),
+    ]  # fmt: skip
+    folder = Path(found["checkpoint"]).parent
+    assert "inherited what qtable-" in (folder / "agent-2.log").read_text()
+    assert "inherited nothing" in (folder / "agent-3.log").read_text()
+    learned = load(Path(found["drivers"][1]["checkpoint"]))[0]
+    assert learned.epoch > 3000, "its own learning steps and its predecessor's"
+
+
+def test_a_standby_is_for_one_robot(system, world, start):
+    system(3)
+    standby = start("agent", "--name", world, "--standby")
+    assert standby.end() == 2
+    assert "a standby keeps in step with the driver of one robot; this world has 3" in standby.stderr
 
 
 def test_a_killed_simulation_of_many_ends_the_run(up, world):

@@ -11,6 +11,7 @@ import msgspec
 import psutil
 import pytest
 from phototaxis.messages import Command, Control, Decoder, State
+from phototaxis.ports import free_ports
 from phototaxis.session import BusOptions, open_session
 from phototaxis_launcher.cli import VERBS
 from support import children, observer, phototaxis, result, wait_status
@@ -141,6 +142,15 @@ def test_a_busy_port_is_one_line(start, world, tmp_path):
         assert process.end() == 3
     assert f"port {port} on 127.0.0.1 is not free" in process.stderr
     assert "--grpc-port" in process.stderr
+
+
+def test_two_services_on_one_port_are_one_line(start, world, tmp_path):
+    (port,) = free_ports(1)
+    ports = "--grpc-port", port, "--web-port", port
+    process = start("recorder", "--name", world, "--output", tmp_path / "r.rrd", *ports)
+    assert process.end() == 3
+    assert f"port {port} on 127.0.0.1 is not free" in process.stderr
+    assert "choose another with --web-port" in process.stderr
 
 
 def test_a_checkpoint_of_another_percept_is_one_line(up, tmp_path):

@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from phototaxis.messages import SCHEMA, Command, Control, Decoder, Refused, encode
+from phototaxis.messages import SCHEMA, AgentLog, Command, Control, Decoder, Refused, SensorsLog, encode
 
 GOOD = {"run": "r", "tick": 3, "author": "a", "left": 0.5, "right": -1.0}
 decode = Decoder(Command, 200)
@@ -47,3 +47,17 @@ def test_what_is_not_a_command_is_refused(payload, reason):
 def test_a_seed_that_cannot_be_one_is_refused_at_the_door(seed):
     with pytest.raises(Refused, match="seed"):
         Decoder(Control, 1000)(encode(Control("begin", seed=seed)))
+
+
+def test_a_log_whose_columns_do_not_fit_its_ticks_is_refused():
+    good = msgspec.to_builtins(
+        AgentLog("r", 0, "w", "mine", "camera", [0, 1], [0, 0], [4, 4], [0.0] * 2, [0.0] * 2, [1.0] * 2)
+    )
+    assert Decoder(AgentLog, 10_000)(msgspec.msgpack.encode(good)).percept == "camera"
+    for change in ({"reward": [0.0]}, {"tick": [], "state": []}, {"tick": [-1, 0]}, {"tick": [0, 2**63]}):
+        with pytest.raises(Refused, match="invalid"):
+            Decoder(AgentLog, 10_000)(msgspec.msgpack.encode({**good, **change}))
+    readings = SensorsLog("r", 0, "w", "built-in", "built-in", [0], [1.0] * 16, [0.5] * 2)
+    broken = {**msgspec.to_builtins(readings), "sonar": [1.0] * 15}
+    with pytest.raises(Refused, match="sonar has 15 values for 1 ticks"):
+        Decoder(SensorsLog, 10_000)(msgspec.msgpack.encode(broken))

@@ -5,16 +5,20 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+import rerun as rr
 from phototaxis.arena import Arena, Light, Wall
+from phototaxis.messages import AgentLog, World
 from phototaxis.recordings import Recording
 from phototaxis.task import ACTIONS, PERCEPTS
 from phototaxis_launcher.recordings import DAY, MEGABYTE, excess
 from phototaxis_recorder import policy
 from phototaxis_recorder.colors import of_distance, of_reward
 from phototaxis_recorder.field import CELLS, light_field
+from phototaxis_recorder.translate import Translator
 from phototaxis_sensors.light import LightModel
 from phototaxis_sensors.model import Past
 from phototaxis_sensors.scene import Scene
+from rerun_files import series
 
 
 def test_the_field_is_what_an_eye_there_reads():
@@ -73,3 +77,18 @@ def test_old_and_excessive_recordings_go_and_the_one_in_use_stays():
     assert [one.file.name for one in excess(found, now, 1.5, None)] == ["2", "3"]
     assert [one.file.name for one in excess(found, now, None, 25)] == ["2", "3"]
     assert [one.file.name for one in excess(found, now, 0, 0)] == ["1", "2", "3"]
+
+
+def test_a_percept_that_nobody_knows_is_recorded_without_a_picture_of_its_states(tmp_path: Path, paper: Arena):
+    recording = rr.RecordingStream("phototaxis", recording_id="r")
+    recording.save(str(tmp_path / "r.rrd"))
+    translator = Translator(recording, World("r", paper, 0, 0))
+    one = [0.5, 0.5]
+    translator.agent(
+        AgentLog("r", 0, "w", "mine", "camera", [0, 1], [0, 0], [4, 4], one, one, one, [1.0] * 7, [1], [2.0] * 9)
+    )
+    translator.flush(last=True)
+    recording.disconnect()
+    assert sorted(series(tmp_path / "r.rrd", "/plots/reward", "Scalars:scalars")) == [0, 1]
+    assert len(series(tmp_path / "r.rrd", "/learner/current", "BarChart:values")) == 1
+    assert not series(tmp_path / "r.rrd", "/learner/table", "Tensor:data")

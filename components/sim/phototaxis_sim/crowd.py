@@ -58,7 +58,8 @@ class Crowd:
         body = self._bodies[row]
         body.position, body.angle = pose[:2], pose.heading
         body.velocity, body.angular_velocity = (0, 0), 0
-        self._space.reindex_shapes_for_body(body)
+        self._space.remove(*body.shapes)  # with all contacts, as `Physics.place` has it
+        self._space.add(*body.shapes)
         self.poses[row] = pose
         self.front[row] = self.rear[row] = False
 
