@@ -37,9 +37,9 @@ def test_a_crowd_moves_as_each_robot_would_alone(name):
         physics.place(pose)
     touched = 0
     for tick in range(120):
-        if tick % 20 == 9:  # some begin anew, where they were stopped or elsewhere
+        if tick % 20 == 9:  # some begin anew, whatever they touch
             for row in range(tick // 20, COUNT, 3):
-                pose = Pose(*crowd.poses[row].tolist()) if row % 2 else poses[row]
+                pose = alone[row].random_pose(rng)
                 crowd.place(row, pose)
                 alone[row].place(pose)
         motors = np.array(ACTIONS)[rng.integers(9, size=COUNT)] if tick % 20 > 10 else np.ones((COUNT, 2))

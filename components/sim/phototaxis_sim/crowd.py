@@ -56,8 +56,9 @@ class Crowd:
     def place(self, row: int, pose: Pose) -> None:
         """Put one robot at rest at a pose."""
         body = self._bodies[row]
-        body.position, body.angle = pose[:2], pose.heading
         body.velocity, body.angular_velocity = (0, 0), 0
+        pymunk.Body.update_position(body, self._arena.motion.physics_step)  # spends what would push it off a wall
+        body.position, body.angle = pose[:2], pose.heading
         self._space.remove(*body.shapes)  # with all contacts, as `Physics.place` has it
         self._space.add(*body.shapes)
         self.poses[row] = pose
