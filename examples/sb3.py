@@ -1,7 +1,7 @@
 """Stable-Baselines3's DQN or PPO, as they are, learn to find the light; then they are measured on fresh placements.
 
     python examples/sb3.py --learner dqn --steps 5000
-    python examples/sb3.py --learner ppo --steps 20000 --save ppo.zip
+    python examples/sb3.py --learner ppo --steps 10000 --save ppo.zip
     phototaxis up --epochs 0 &
     python examples/sb3.py --learner dqn --steps 2000 --connect local
 

@@ -198,6 +198,20 @@ def test_a_program_that_forgets_to_close_ends_and_frees_the_seat(system, world):
         wait_status(bus, lambda status: not status.driver, system["sim"])
 
 
+def test_an_agent_that_took_over_once_does_not_take_the_seat_back(system, world, start):
+    """As all agents in containers are, and all that `phototaxis swap` brings."""
+    agent = start("agent", "--name", world, "--take-over")
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.driver.startswith("qtable-"), agent)
+        environment = make(world)
+        for seed in (1, 2):
+            environment.reset(seed=seed)
+            for _ in range(100):
+                environment.step(4)
+        environment.close()
+        wait_status(bus, lambda status: status.driver.startswith("qtable-"), agent)
+
+
 def test_in_real_time_a_step_shows_what_its_action_did(start, world):
     """However long a learner takes: what came meanwhile is passed over, an answer that was late is given again."""
     system = start("sim", "--name", world, "--speed", 20), start("sensors", "--name", world)

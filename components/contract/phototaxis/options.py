@@ -46,19 +46,21 @@ def add_options(
     """Give `parser` (or an argument group) one option for each field of `struct`.
 
     `defaults` are what the help says in place of the Struct's own. Left out on the command line, a field
-    keeps its default. Booleans are flags; lists may be
-    repeated. Values are checked in `parse`, so that the messages come from one place.
+    keeps its default. Booleans are flags; lists may be repeated. Values are checked in `parse`, so that the
+    messages come from one place.
     """
     texts = field_help(struct)
     for item in msgspec.structs.fields(struct):
         plain, choices = _plain(item.type)
         default = defaults.get(item.name, None if item.default is msgspec.NODEFAULT else item.default)
-        shown = "" if default in (None, "", False) else f" (default {default})"
+        hidden = item.name in positional or default is None or default is False or default in ("", [])
+        shown = "" if hidden else f" (default {default})"
         help_text = (texts.get(item.name, "") + shown).replace("%", "%%")
         flag = "--" + item.name.replace("_", "-")
         metavar = "|".join(choices) if choices else item.name.upper()
         if item.name in positional:
-            parser.add_argument(item.name, help=help_text, metavar=metavar)
+            optional: dict[str, Any] = {} if item.required else {"nargs": "?", "default": argparse.SUPPRESS}
+            parser.add_argument(item.name, help=help_text, metavar=metavar, **optional)
         elif plain is bool:
             parser.add_argument(flag, help=help_text, action="store_true", default=argparse.SUPPRESS)
         elif typing.get_origin(plain) is list:

@@ -20,7 +20,7 @@ def page() -> str:
         topics=topics.table(),
         limits=_limits(),
         rights=rights.table(),
-        messages="\n\n".join(_message(topic) for topic in topics.TOPICS.values()),
+        messages="\n\n".join([*map(_message, topics.TOPICS.values()), _fields(messages.LogRequest, "log/…")]),
         json_schema=json.dumps(_schema(), indent=1),
         first=f"{defaults['first']:g}",
         most=f"{defaults['most']:g}",
@@ -68,7 +68,7 @@ def _type(kind: Any) -> str:
         return f"[{found['$ref'].rsplit('/', 1)[1]}](#json-schema)"
     if "anyOf" in found:
         return " or ".join(one.get("type", one.get("$ref", "").rsplit("/", 1)[-1]) for one in found["anyOf"])
-    words = [found.get("type", "any")]
+    words = ["bytes" if "contentEncoding" in found else found.get("type", "any")]
     words += [f"{word} {found[key]}" for key, word in BOUNDS.items() if key in found]
     return ", ".join(words)
 

@@ -25,7 +25,7 @@ class StatusOptions(BusOptions, kw_only=True):
 class ControlOptions(BusOptions, kw_only=True):
     """Options of `phototaxis control`."""
 
-    verb: Literal["pause", "resume", "step", "speed", "reset", "begin", "stop"] = "pause"
+    verb: Literal["pause", "resume", "step", "speed", "reset", "begin", "stop"]
     """what to do; step: one tick of a paused simulation; reset: end the episode; begin: a new run"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """for the verb speed: simulated seconds per second; 0: lockstep"""

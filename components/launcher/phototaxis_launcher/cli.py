@@ -25,7 +25,7 @@ VERBS = {
     "status": Verb(
         "phototaxis_launcher.ask:status", "launcher", "who is alive, which tick, who drives, what is awaited"
     ),
-    "control": Verb("phototaxis_launcher.ask:control", "launcher", "pause, resume, step, speed, reset, stop"),
+    "control": Verb("phototaxis_launcher.ask:control", "launcher", "pause, resume, step, speed, reset, begin, stop"),
     "swap": Verb("phototaxis_launcher.swap:main", "launcher", "hand the seat to another learner while the robot runs"),
     "router": Verb("phototaxis_launcher.router:main", "launcher", "a Zenoh router, for components on several machines"),
     "certs": Verb("phototaxis_launcher.certs:main", "certs", "certificates and passwords for a guarded router"),

@@ -16,7 +16,7 @@ PATIENCE = 3.0
 class Options(BusOptions, kw_only=True):
     """Options of `phototaxis health`."""
 
-    role: Literal["router", "sim", "sensors", "agent", "recorder"] = "router"
+    role: Literal["router", "sim", "sensors", "agent", "recorder"]
     """router: the bus can be entered; the others: the component's token is there; sim: it answers as well"""
     id: str = ""
     """the component's own --id (default: any component of that role)"""

@@ -41,10 +41,8 @@ class Options(msgspec.Struct, kw_only=True):
 
 
 def main(argv: Sequence[str]) -> int:
-    words = list(argv)
-    run = [words.pop(0)] if words and not words[0].startswith("-") else []
     about = "Open the live view, or with RUN (a file, a run's name, or last) a recording, in the same layout."
-    options = parse(Options, [*(f"--run={name}" for name in run), *words], "phototaxis view", about)
+    options = parse(Options, argv, "phototaxis view", about, positional=["run"])
     if options.picture and Path(options.picture).suffix not in (".png", ".gif"):
         raise UserError(f"--picture {options.picture}: it must end in .png or .gif")
     web = options.web or not has_display()
