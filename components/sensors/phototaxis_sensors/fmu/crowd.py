@@ -1,9 +1,6 @@
 """FMUs as the sensors of many robots at once: all instances in one process, stepped together."""
 
-import sys
-
 import numpy as np
-from phototaxis.errors import ComponentFailed
 from phototaxis.messages import World
 
 from phototaxis_sensors.crowd import CrowdSuite
@@ -28,21 +25,19 @@ class Crew:
         self._factor = np.repeat([wire.factor for wire in wiring.inputs], sizes)
         self._offset = np.repeat([wire.offset for wire in wiring.inputs], sizes)
 
-    def __call__(self, tick: int, ours: np.ndarray) -> np.ndarray:
-        """From the inputs of all instances to all outputs; both flat, robot by robot, in our units."""
+    def __call__(self, tick: int, ours: np.ndarray) -> np.ndarray | None:
+        """From the inputs of all instances to all outputs, robot by robot, in our units; None when it was given up."""
         inputs = ours.reshape(-1, len(self._factor)) * self._factor + self._offset
-        return np.array(self._stepped(0, tick, inputs.ravel().tolist()))
+        outputs = self._stepped(0, tick, inputs.ravel().tolist())
+        return None if outputs is None else np.array(outputs)
 
 
 class FmuCrowd(CrowdSuite):
-    """Readings of N robots, some of them from FMUs; for one episode, tick by tick.
+    """Readings of N robots, some of them from FMUs; for one episode, tick by tick."""
 
-    With `fallback` the built-in model takes the place of an FMU that keeps failing; else that is an error.
-    """
-
-    def __init__(self, world: World, sonar: Crew | None, light: Crew | None, fallback: bool):
+    def __init__(self, world: World, sonar: Crew | None, light: Crew | None):
         super().__init__(world)
-        self._sonar_crew, self._light_crew, self._fallback, self._tick = sonar, light, fallback, 0
+        self._sonar_crew, self._light_crew, self._tick = sonar, light, 0
 
     def __call__(self, tick: int, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Sonars (16, N) in m and lights (2, N) in 0..1 at poses (N, 3)."""
@@ -54,30 +49,18 @@ class FmuCrowd(CrowdSuite):
         if self._sonar_crew is None:
             return ranges
         farthest = self._arena.robot.sonar_range
-        try:
-            found = self._sonar_crew(self._tick, np.minimum(ranges, farthest).T)
-        except ComponentFailed as error:
-            self._sonar_crew = self._without(error)
-            return ranges
-        return np.clip(found.reshape(len(poses), -1).T, 0.0, farthest)
+        found = self._sonar_crew(self._tick, np.minimum(ranges, farthest).T)
+        return ranges if found is None else np.clip(found.reshape(len(poses), -1).T, 0.0, farthest)
 
     def _light(self, poses: np.ndarray) -> np.ndarray:
         crew = self._light_crew
         if crew is None:
             return super()._light(poses)
         ours = super()._light(poses).T if crew.ports == ["raw"] else self._sights(poses, crew.ports)
-        try:
-            found = crew(self._tick, ours).reshape(len(poses), 2, -1)
-        except ComponentFailed as error:
-            self._light_crew = self._without(error)
+        found = crew(self._tick, ours)
+        if found is None:
             return super()._light(poses)
-        return np.clip(found.sum(axis=2).T, 0.0, 1.0)
-
-    def _without(self, error: ComponentFailed) -> None:
-        """Say that an FMU is given up; raise the error where that was not asked for."""
-        if not self._fallback:
-            raise error
-        print(f"sensors: {error}; the built-in model takes its place", file=sys.stderr, flush=True)
+        return np.clip(found.reshape(len(poses), 2, -1).sum(axis=2).T, 0.0, 1.0)
 
     def _sights(self, poses: np.ndarray, ports: list[str]) -> np.ndarray:
         """What the instances see: (robot, sensor, lamp, port)."""

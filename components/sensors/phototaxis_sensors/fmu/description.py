@@ -6,7 +6,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import fmpy
-from fmpy.model_description import ModelDescription, ModelVariable, ValidationError, read_model_description
+from fmpy.model_description import (
+    CoSimulation,
+    ModelDescription,
+    ModelVariable,
+    ValidationError,
+    read_model_description,
+)
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from phototaxis.errors import UserError
 
@@ -23,6 +29,7 @@ class Fmu(NamedTuple):
     version: int
     """2 or 3."""
     description: ModelDescription
+    interface: CoSimulation
     library: str
     """Path of its library inside the archive."""
     platforms: list[str]
@@ -39,8 +46,7 @@ class Fmu(NamedTuple):
     @property
     def once(self) -> bool:
         """Whether a process can have only one instance of it."""
-        interface = self.description.coSimulation
-        return interface is not None and interface.canBeInstantiatedOnlyOncePerProcess
+        return self.interface.canBeInstantiatedOnlyOncePerProcess
 
     def variable(self, name: str) -> ModelVariable | None:
         """The variable of that name."""
@@ -75,14 +81,15 @@ def read(path: str) -> Fmu:
     if size > LARGEST:
         raise UserError(f"{path}: {size / 1e9:.1f} GB when unpacked; at most {LARGEST / 1e9:g} GB are allowed")
     description = _describe(path)
-    if description.coSimulation is None:
+    interface = description.coSimulation
+    if interface is None:
         raise UserError(f"{path}: made for Model Exchange alone; needed is an FMU for Co-Simulation")
     place = fmpy.platform if version == 2 else fmpy.platform_tuple
-    library = f"binaries/{place}/{description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
+    library = f"binaries/{place}/{interface.modelIdentifier}{fmpy.sharedLibraryExtension}"
     parts = [member.split("/") for member in members]
     platforms = sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
     sources = any(part[0] == "sources" and part[-1].endswith((".c", ".cpp")) for part in parts)
-    return Fmu(file, version, description, library, platforms, sources, library in members)
+    return Fmu(file, version, description, interface, library, platforms, sources, library in members)
 
 
 def _version(path: str, archive: zipfile.ZipFile) -> int:

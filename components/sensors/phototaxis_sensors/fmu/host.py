@@ -10,7 +10,6 @@ import time
 import zipfile
 from collections.abc import Sequence
 from io import BytesIO
-from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import msgspec
@@ -74,17 +73,18 @@ class Host:
         """
         self.stop()
         self._folder = TemporaryDirectory(prefix="phototaxis-fmu-", ignore_cleanup_errors=True)
-        self._unpack(Path(self._folder.name))
+        folder = self._folder.name
+        self._unpack(folder)
         self._process = subprocess.Popen(
             [sys.executable, "-m", "phototaxis_sensors.fmu.worker"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0, start_new_session=True,
         )  # fmt: skip
-        assert self._process.stdin is not None  # noqa: S101
+        assert self._process.stdin is not None  # noqa: S101 - said to the type checker: both are pipes
         assert self._process.stdout is not None  # noqa: S101
         self._to, self._from = self._process.stdin.fileno(), self._process.stdout.fileno()
         self._poll = select.poll()
         self._poll.register(self._from, select.POLLIN)
-        setup = msgspec.json.encode(self._setup())
+        setup = msgspec.json.encode(self._setup(folder))
         self._write(LENGTH.pack(len(setup)) + setup)
         self._read(HEAD.size, LOADING)
 
@@ -125,19 +125,17 @@ class Host:
         """Of the process; 0 when there is none."""
         return 0 if self._process is None else self._process.pid
 
-    def _setup(self) -> Setup:
-        interface, wiring = self._fmu.description.coSimulation, self._wiring
-        assert interface is not None  # noqa: S101
-        assert self._folder is not None  # noqa: S101
+    def _setup(self, folder: str) -> Setup:
+        interface, wiring = self._fmu.interface, self._wiring
         return Setup(
-            folder=self._folder.name, version=self._fmu.version, identifier=interface.modelIdentifier or "",
+            folder=folder, version=self._fmu.version, identifier=interface.modelIdentifier or "",
             token=self._fmu.description.guid or "", instances=self._instances,
             inputs=[wire.variable.valueReference for wire in wiring.inputs], values_in=self._values_in,
             outputs=[wire.variable.valueReference for wire in wiring.outputs], values_out=self._values_out,
             parameters=[(one.kind, one.reference, one.value) for one in wiring.parameters], period=self._period,
         )  # fmt: skip
 
-    def _unpack(self, folder: Path) -> None:
+    def _unpack(self, folder: str) -> None:
         try:
             with zipfile.ZipFile(self._fmu.file if self._archive is None else BytesIO(self._archive)) as archive:
                 archive.extractall(folder)  # it strips what would lead out of the folder

@@ -36,10 +36,15 @@ class Stepped:
     host : runs them.
     wiring : how one of them is connected.
     label : names it in messages, as in "light FMU lag.fmu".
+    fallback : give it up when it keeps failing; otherwise that is an error.
+
+    Attributes
+    ----------
+    failed : it has been given up.
     """
 
-    def __init__(self, host: Host | Team, wiring: Wiring, label: str):
-        self.label, self._host = label, host
+    def __init__(self, host: Host | Team, wiring: Wiring, label: str, fallback: bool):
+        self.label, self._host, self._fallback, self.failed = label, host, fallback, False
         self._episode, self._tick = -1, -1
         self._steps: deque[Step] = deque(maxlen=REMEMBERED)
         self._failures: deque[float] = deque(maxlen=RESTARTS + 1)
@@ -49,14 +54,16 @@ class Stepped:
         self.anew = -1
         """Tick at which it had to forget the earlier part of an episode; −1: never."""
 
-    def __call__(self, episode: int, tick: int, inputs: list[float]) -> Sequence[float]:
-        """Outputs of all instances, in our units.
+    def __call__(self, episode: int, tick: int, inputs: list[float]) -> Sequence[float] | None:
+        """Outputs of all instances, in our units; None when it has been given up.
 
         Raises
         ------
         ComponentFailed
-            when it keeps failing.
+            when it keeps failing and there is no fallback.
         """
+        if self.failed:
+            return None
         fresh = episode != self._episode
         if fresh:
             self._steps.clear()
@@ -69,18 +76,23 @@ class Stepped:
             outputs = self._checked(self._host.step(inputs, step.periods))
         except Failed as why:
             outputs = self._again(why)
-        if self._plain:
+        if outputs is None or self._plain:
             return outputs
         return [(value - wire.offset) / wire.factor for value, wire in zip(outputs, cycle(self._outputs), strict=False)]
 
-    def _again(self, why: Failed) -> Sequence[float]:
-        """Restart it and lead it through the episode again."""
+    def _again(self, why: Failed) -> Sequence[float] | None:
+        """Restart it and lead it through the episode again, or give it up."""
         while True:
             self._failures.append(time.monotonic())
             line = f"{self.label}: {why} at tick {self._tick}"
             if len(self._failures) > RESTARTS and self._failures[-1] - self._failures[0] < WITHIN:
                 self._host.stop()
-                raise ComponentFailed(f"{line}, after {RESTARTS} restarts")
+                line = f"{line}, after {RESTARTS} restarts"
+                if not self._fallback:
+                    raise ComponentFailed(line)
+                print(f"sensors: {line}; the built-in model takes its place", file=sys.stderr, flush=True)
+                self.failed = True
+                return None
             print(f"sensors: {line}; restarted", file=sys.stderr, flush=True)
             if len(self._steps) == REMEMBERED:
                 self.anew = self._tick
@@ -117,18 +129,17 @@ class FmuModel:
     ----------
     stepped : its instances.
     rig : what the instances are given, and what becomes of their outputs.
-    fallback : takes its place when it keeps failing; None: that is an error.
+    builtin : takes its place when it has been given up.
     """
 
-    def __init__(self, stepped: Stepped, rig: Rig, fallback: SensorModel | None, name: str):
-        self._stepped, self._rig, self._fallback, self._name = stepped, rig, fallback, name
-        self._failed = False
+    def __init__(self, stepped: Stepped, rig: Rig, builtin: SensorModel, name: str):
+        self._stepped, self._rig, self._builtin, self._name = stepped, rig, builtin, name
 
     remembers = True
 
     @property
     def name(self) -> str:
-        if self._failed:
+        if self._stepped.failed:
             return f"{BuiltIn.name}, as {self._name} failed"
         anew = self._stepped.anew
         return self._name if anew < 0 else f"{self._name}, its state begun anew at tick {anew}"
@@ -138,13 +149,5 @@ class FmuModel:
         self._stepped.anew = tick
 
     def __call__(self, moment: Moment) -> Sequence[float]:
-        if self._failed and self._fallback is not None:
-            return self._fallback(moment)
-        try:
-            return self._rig.collect(self._stepped(moment.episode, moment.tick, self._rig.feed(moment)))
-        except ComponentFailed as error:
-            if self._fallback is None:
-                raise
-            print(f"sensors: {error}; the built-in model takes its place", file=sys.stderr, flush=True)
-            self._failed = True
-            return self._fallback(moment)
+        outputs = self._stepped(moment.episode, moment.tick, self._rig.feed(moment))
+        return self._builtin(moment) if outputs is None else self._rig.collect(outputs)

@@ -96,8 +96,8 @@ class FmuSensors:
             each = sensors * (len(arena.lights) if kind == "light" and wired.wiring.ports != ["raw"] else 1)
             self._warn(wired, arena.motion.control_period)
             host = self._host(wired, count * each, arena.motion.control_period)
-            crews[kind] = Crew(Stepped(host, wired.wiring, wired.label), wired.wiring)
-        return FmuCrowd(world, crews.get("sonar"), crews.get("light"), self._options.fmu_fallback)
+            crews[kind] = Crew(self._stepped(host, wired), wired.wiring)
+        return FmuCrowd(world, crews.get("sonar"), crews.get("light"))
 
     def close(self) -> None:
         """End the FMUs' processes."""
@@ -135,8 +135,10 @@ class FmuSensors:
     def _model(self, wired: Wired, arena: Arena, rig: Rig, builtin: SensorModel) -> FmuModel:
         self._warn(wired, arena.motion.control_period)
         host = self._host(wired, rig.instances, arena.motion.control_period)
-        fallback = builtin if self._options.fmu_fallback else None
-        return FmuModel(Stepped(host, wired.wiring, wired.label), rig, fallback, wired.fmu.name)
+        return FmuModel(self._stepped(host, wired), rig, builtin, wired.fmu.name)
+
+    def _stepped(self, host: Host | Team, wired: Wired) -> Stepped:
+        return Stepped(host, wired.wiring, wired.label, self._options.fmu_fallback)
 
 
 def _pairs(flag: str, items: Sequence[str], given: Sequence[str]) -> Mapping[str, dict[str, str]]:
