@@ -20,7 +20,7 @@ from phototaxis.session import BusOptions, open_session
 from support import Process, command, phototaxis, wait_status
 
 WORLDS = ("a", "b")
-ANYWHERE = "0.0.0.0"  # noqa: S104
+ANYWHERE = "0.0.0.0"  # noqa: S104 - what is tried is that this needs credentials
 
 
 @pytest.fixture(scope="module")

@@ -204,9 +204,9 @@ def test_a_simulation_killed_where_an_episode_begins_keeps_the_seat_too(start, w
     with open_session("agent", options, "raw") as session, Bus(session, world, "agent", "raw") as bus:
         assert bus.wait_for("sim", DEADLINE)
         assert bus.control(Control("claim", "raw"), timeout=DEADLINE)
-        mine = lambda event: event.topic == "readings" and event.message.driver == "raw"  # noqa: E731
-        bus.put("command", Command("r", wait(bus, mine, sim, sensors).message.tick, "raw", 0.0, 0.0, "asked"))
-        wait(bus, lambda event: mine(event) and event.message.episode == 1, sim, sensors)
+        asked = wait(bus, lambda event: event.topic == "readings" and event.message.driver == "raw", sim, sensors)
+        bus.put("command", Command("r", asked.message.tick, "raw", 0.0, 0.0, "asked"))
+        wait(bus, lambda event: event.topic == "readings" and event.message.episode == 1, sim, sensors)
         sim.kill()
         wait(bus, lambda event: event.topic == "gone" and event.message[0] == "sim", sensors)
         again = start(*words)

@@ -9,7 +9,7 @@ from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
-from phototaxis.messages import Seed, World
+from phototaxis.messages import Count, Seed, World
 
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.server import Mode, Server
@@ -27,7 +27,7 @@ class Options(ComponentOptions, kw_only=True):
     """checkpoint to begin with"""
     take_over: bool = False
     """take the seat from whoever drives, at the next tick boundary, and leave when a successor drives"""
-    at: Annotated[int, Meta(ge=0)] = 0
+    at: Count = 0
     """with --take-over: not before this tick"""
     standby: bool = False
     """drive when the driver vanishes; until then keep in step with it, or learn from what it does"""

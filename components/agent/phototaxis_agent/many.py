@@ -21,7 +21,7 @@ class Follower(Agent):
         self.last, self.command = Step(0, -1, 0.0, 0.0, 0.0), None
 
     @property
-    def epoch(self) -> int:  # type: ignore[override]
+    def epoch(self) -> int:  # type: ignore[override] - a plain attribute of the leader
         """Learning steps of all robots."""
         return self._leader.epoch
 

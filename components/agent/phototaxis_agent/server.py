@@ -85,7 +85,7 @@ class Server:
         self._at = at
         self._journal = None if path is None else Journal(path.with_suffix(".journal"))
         self._session: Session | None = None
-        self._driving = self._seated = self._replaced = self._enlisted = self._served = False
+        self._driving = self._seated = self._replaced = self._enlisted = False
         self._leader = self._predecessor = ""
         """The driver that is followed; the last one that was seen."""
         self._related = self._in_step = False
@@ -143,7 +143,7 @@ class Server:
         now = time.monotonic()
         if now < self._claim_at:
             return
-        if self._mode == "claim" or (self._mode == "take over" and (self._seated or self._served)):
+        if self._mode == "claim":
             if not readings.driver:
                 self._claim_at = now + CLAIM_EVERY
                 self._bus.control(Control("claim", self._bus.ident))
@@ -171,6 +171,8 @@ class Server:
             if self._inherit(session):
                 self._say(f"inherited what {self._leader} knew at tick {session.agent.tick[1]}")
         self._driving = self._seated = self._in_step = True
+        if self._mode == "take over":  # but once
+            self._mode = "claim"
         self._say(f"drives from tick {readings.tick} on")
 
     def _inherit(self, session: Session, probe: bool = False) -> bool:
@@ -253,7 +255,6 @@ class Server:
         else:
             agent = self._session.agent
         self._session = Session(world, agent, _answering(world, agent))
-        self._served = self._served or self._seated  # in an earlier run
         self._driving = self._seated = self._enlisted = self._related = self._in_step = False
         self._leader = self._predecessor = ""
         self._replay(self._session)

@@ -53,7 +53,7 @@ def add_options(
     for item in msgspec.structs.fields(struct):
         plain, choices = _plain(item.type)
         default = defaults.get(item.name, None if item.default is msgspec.NODEFAULT else item.default)
-        hidden = item.name in positional or default is None or default is False or default in ("", [])
+        hidden = item.name in positional or default is False or default in (None, "")
         shown = "" if hidden else f" (default {default})"
         help_text = (texts.get(item.name, "") + shown).replace("%", "%%")
         flag = "--" + item.name.replace("_", "-")

@@ -13,7 +13,9 @@ def free_ports(count: int) -> list[int]:
 
 
 def find_ports(host: str, wanted: Mapping[str, int]) -> list[int]:
-    """A free TCP port for each option: the one that it names, or any for 0. All are held until the last is found.
+    """A free TCP port for each option: the one that it names, any for 0, and −1 for −1.
+
+    All are held until the last is found.
 
     Raises
     ------
@@ -23,6 +25,9 @@ def find_ports(host: str, wanted: Mapping[str, int]) -> list[int]:
     found: list[int] = []
     with ExitStack() as held:
         for flag, port in wanted.items():
+            if port < 0:
+                found.append(port)
+                continue
             try:
                 server = held.enter_context(socket.create_server((host, port)))
             except OSError as error:

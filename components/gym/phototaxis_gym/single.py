@@ -14,7 +14,7 @@ from phototaxis_gym import CAP
 from phototaxis_gym.draw import Canvas, Window
 from phototaxis_gym.place import Here, Place
 from phototaxis_gym.remote import There
-from phototaxis_gym.spaces import MOTORS, actions, known, limit, observation, rewards
+from phototaxis_gym.spaces import MOTORS, actions, observation, rewards, valid_cap, valid_percept
 
 SEEDS = 2**31
 
@@ -63,8 +63,8 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         modes = self.metadata["render_modes"]
         if render_mode is not None and render_mode not in modes:
             raise Error(f"no render_mode '{render_mode}'; there are: {', '.join(modes)}")
-        self._reward, self.action_space = rewards(reward, known(percept)), actions(action)
-        self._cap, self.render_mode = limit(cap), render_mode
+        self._reward, self.action_space = rewards(reward, valid_percept(percept)), actions(action)
+        self._cap, self.render_mode = valid_cap(cap), render_mode
         try:
             self._place: Place = There(connect, world, timeout) if connect else Here(arenas.load(arena or "paper"))
         except UserError as error:

@@ -68,7 +68,7 @@ def _rows(variables: tuple[Any, ...]) -> np.ndarray:
     return rows
 
 
-def known(percept: str) -> str:
+def valid_percept(percept: str) -> str:
     """The name of an observation.
 
     Raises
@@ -118,7 +118,7 @@ def actions(kind: str) -> spaces.Space[Any]:
     raise Error(f"no actions '{kind}'; there are: discrete, continuous")
 
 
-def limit(cap: int) -> int:
+def valid_cap(cap: int) -> int:
     """The steps of an episode, at least one.
 
     Raises

@@ -17,7 +17,7 @@ from phototaxis_sim import arenas
 from phototaxis_gym import CAP
 from phototaxis_gym.place import ManyHere, Places
 from phototaxis_gym.remote import ManyThere
-from phototaxis_gym.spaces import MOTORS, actions, known, limit, observation, rewards
+from phototaxis_gym.spaces import MOTORS, actions, observation, rewards, valid_cap, valid_percept
 
 SEEDS = 2**31
 REACHED, CAPPED = ENDS.index("reached"), ENDS.index("cap")
@@ -53,8 +53,8 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
             raise Error(f"arena '{arena}': that is the running system's; leave it out with connect")
         if num_envs < 1:
             raise Error(f"num_envs {num_envs}: at least one robot is needed")
-        self.num_envs, self._cap = num_envs, limit(cap)
-        self._reward, self.single_action_space = rewards(reward, known(percept)), actions(action)
+        self.num_envs, self._cap = num_envs, valid_cap(cap)
+        self._reward, self.single_action_space = rewards(reward, valid_percept(percept)), actions(action)
         try:
             self._place: Places = (
                 ManyThere(connect, world, timeout, num_envs) if connect else ManyHere(arenas.load(arena or "paper"))

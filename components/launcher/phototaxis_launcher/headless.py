@@ -49,7 +49,7 @@ def _connected(process: subprocess.Popen[bytes], port: str, said: Any) -> Any:
             client.get_state()
             return client
         except Exception:
-            time.sleep(0.1)
+            time.sleep(0.1)  # a program that does not say when it can be asked
     said.seek(0)
     lines = said.read().decode(errors="replace").strip().splitlines()
     raise ComponentFailed(
@@ -70,7 +70,7 @@ def shown_tick(client: Any) -> int:
 def picture(source: str, target: Path, seconds: float) -> None:
     """Write what the viewer shows: a .png after `seconds`, or those seconds that follow as a .gif."""
     with viewer(source) as client, tempfile.TemporaryDirectory() as folder:
-        time.sleep(seconds)
+        time.sleep(seconds)  # the moment that is wanted
         if target.suffix == ".png":
             client.save_screenshot(str(target.resolve()))
             return
@@ -82,5 +82,5 @@ def picture(source: str, target: Path, seconds: float) -> None:
             with Image.open(file) as image:
                 height = round(image.height * ANIMATION_WIDTH / image.width)
                 frames.append(image.convert("RGB").resize((ANIMATION_WIDTH, height)).quantize(96))
-            time.sleep(max(began + 1 / FRAMES_A_SECOND - time.monotonic(), 0))
+            time.sleep(max(began + 1 / FRAMES_A_SECOND - time.monotonic(), 0))  # until the next frame
         frames[0].save(target, save_all=True, append_images=frames[1:], duration=1000 // FRAMES_A_SECOND, loop=0)

@@ -14,9 +14,9 @@ from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
 from phototaxis.errors import ComponentFailed, UserError
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import MOST, Launch, LaunchReply, Seed, Status, run_name
+from phototaxis.messages import MOST, Count, Launch, LaunchReply, Seed, Status, run_name
 from phototaxis.options import Parser, add_options, convert, flags, peek
-from phototaxis.ports import free_ports
+from phototaxis.ports import find_ports
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
 
@@ -38,7 +38,7 @@ class UpOptions(BusOptions, kw_only=True):
     """name of a shipped arena, or a TOML file"""
     seed: Seed = 0
     """decides everything: placements, noise, the learner and its exploration"""
-    epochs: Annotated[int, Meta(ge=0)] = 3000
+    epochs: Count = 3000
     """learning steps; 0: run until stopped"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """simulated seconds per second; 0: lockstep, as fast as it goes"""
@@ -92,8 +92,8 @@ class Run:
         for tick, learner in swaps:
             self._agent(self._successor(["--learner", learner]), "--take-over", f"--at={tick}")
         if not options.no_recorder:
-            asked = (options.grpc_port, options.web_port)
-            grpc, web = (port or free for port, free in zip(asked, free_ports(2), strict=True))
+            wanted = {"--grpc-port": options.grpc_port, "--web-port": options.web_port}
+            grpc, web = find_ports("127.0.0.1", wanted)
             self.children["recorder"] = self._child(
                 "recorder", *bus, f"--output={self.recording}", f"--grpc-port={grpc}", f"--web-port={web}"
             )

@@ -42,8 +42,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     output = Path(options.output)
     if not output.parent.is_dir():
         raise UserError(f"--output {output}: there is no folder {output.parent}")
-    page_port = {"--web-port": options.web_port} if options.web_port >= 0 else {}
-    grpc_port, web_port = [*find_ports(options.bind, {"--grpc-port": options.grpc_port, **page_port}), -1][:2]
+    wanted = {"--grpc-port": options.grpc_port, "--web-port": options.web_port}
+    grpc_port, web_port = find_ports(options.bind, wanted)
     recording: list[rr.RecordingStream] = []
     file = output
 

@@ -175,8 +175,10 @@ class Translator:
         log, percept = self._recording, PERCEPTS.get(chunk.percept)
         if len(chunk.current) == len(ACTIONS):
             rr.log("learner/current", rr.BarChart(np.array(chunk.current), color=BLUE), recording=log)
-        states = 0 if percept is None else math.prod(percept.sizes)
-        if percept is not None and len(chunk.visits) == states > 0 and len(chunk.values) == states * len(ACTIONS):
+        if percept is None:
+            return
+        states = math.prod(percept.sizes)
+        if len(chunk.visits) == states > 0 and len(chunk.values) == states * len(ACTIONS):
             visits = np.array(chunk.visits)
             table = np.reshape(chunk.values, (states, len(ACTIONS))).astype(np.float32)
             rr.log("learner/table", rr.Tensor(table, dim_names=["state", "action"]), recording=log)

@@ -9,7 +9,7 @@ from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
 from phototaxis.journal import Journal
-from phototaxis.messages import MOST, Seed, run_name
+from phototaxis.messages import MOST, Count, Seed, run_name
 from phototaxis.options import parse
 
 
@@ -20,7 +20,7 @@ class Options(ComponentOptions, kw_only=True):
     """name of a shipped arena, or a TOML file"""
     seed: Seed = 0
     """decides placements and sensor noise"""
-    epochs: Annotated[int, Meta(ge=0)] = 0
+    epochs: Count = 0
     """learning steps after which the run is finished; 0: run until stopped"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """simulated seconds per second; 0: lockstep, as fast as the answers come"""

@@ -218,7 +218,7 @@ def serve(source: int, answers: int) -> None:
 def _outlive(parent: int, folder: str) -> None:
     """End with the parent even in the middle of an endless loop, and leave nothing."""
     while os.getppid() == parent:
-        time.sleep(0.5)
+        time.sleep(0.5)  # portable, which prctl and kqueue are not
     shutil.rmtree(folder, ignore_errors=True)
     os._exit(1)
 
