@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import rerun as rr
 from phototaxis.arena import Arena, Light, Wall
-from phototaxis.messages import AgentLog, World
+from phototaxis.messages import AgentLog, SensorsLog, SimLog, World
 from phototaxis.recordings import Recording
 from phototaxis.task import ACTIONS, PERCEPTS
 from phototaxis_launcher.recordings import DAY, MEGABYTE, excess
@@ -92,3 +92,16 @@ def test_a_percept_that_nobody_knows_is_recorded_without_a_picture_of_its_states
     assert sorted(series(tmp_path / "r.rrd", "/plots/reward", "Scalars:scalars")) == [0, 1]
     assert len(series(tmp_path / "r.rrd", "/learner/current", "BarChart:values")) == 1
     assert not series(tmp_path / "r.rrd", "/learner/table", "Tensor:data")
+
+
+def test_a_pose_that_nobody_sensed_has_no_rays_of_another(tmp_path: Path, paper: Arena):
+    recording = rr.RecordingStream("phototaxis", recording_id="r")
+    recording.save(str(tmp_path / "r.rrd"))
+    translator = Translator(recording, World("r", paper, 0, 0))
+    none, place = [0, 0, 0], [1.0, 1.0, 1.0]
+    translator.sim(SimLog("r", 0, "s", "", [0, 1, 2], none, place, place, place, place, place, place, none, []))
+    translator.sensors(SensorsLog("r", 0, "s", "built-in", "built-in", [0, 1], [1.0] * 32, [0.5] * 4))
+    translator.flush(last=True)
+    recording.disconnect()
+    assert sorted(series(tmp_path / "r.rrd", "/world/trail", "Points2D:positions")) == [0, 1, 2]
+    assert sorted(series(tmp_path / "r.rrd", "/world/robot/sonar", "Clear:is_recursive")) == [2]

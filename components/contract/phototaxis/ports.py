@@ -1,5 +1,6 @@
 """Ports of this machine that nothing listens on."""
 
+import os
 import socket
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -32,7 +33,7 @@ def find_ports(host: str, wanted: Mapping[str, int]) -> list[int]:
                 server = held.enter_context(socket.create_server((host, port)))
             except OSError as error:
                 raise Unavailable(
-                    f"port {port} on {host} is not free ({error.strerror}); "
+                    f"port {port} on {host} is not free ({os.strerror(error.errno or 0)}); "
                     f"choose another with {flag} (0: any free one)"
                 ) from None
             found.append(server.getsockname()[1])

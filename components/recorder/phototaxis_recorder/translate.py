@@ -114,6 +114,9 @@ class Translator:
             self._send("plots/td_error", tick, rr.Scalars.columns(scalars=error))
             self._send("plots/temperature", tick, rr.Scalars.columns(scalars=temperature))
             self._send("plots/action", tick, rr.Scalars.columns(scalars=action))
+        if last and self._newest["sim"] > self._newest["sensors"]:  # stopped before it was sensed: no rays of before
+            self._at(self._newest["sensors"] + 1)
+            rr.log("world/robot/sonar", rr.Clear(recursive=False), recording=self._recording)
         for episode in self._episodes:
             self._recent.append(episode.end == "reached")
             steps = "step" if episode.steps == 1 else "steps"
