@@ -188,6 +188,31 @@ def test_a_killed_simulation_continues_the_run_that_was_begun(start, world, tmp_
     there.close()
 
 
+def test_a_simulation_killed_after_it_obeyed_is_not_driven_twice(start, world, tmp_path):
+    """It comes back with nobody on the seat, and with the motors of the command whose readings never came."""
+    words = ["sim", "--name", world, "--run", "r", "--seed", 9, "--journal", tmp_path / "sim.journal"]
+    sim, sensors = start(*words), start("sensors", "--name", world)
+    here, there = gymnasium.make(NAME, percept="sensors"), make(world, percept="sensors")
+    np.testing.assert_array_equal(here.reset(seed=4)[0], there.reset(seed=4)[0])
+    for environment in (here, there):
+        environment.step(7)
+    sensors.popen.send_signal(signal.SIGSTOP)
+    answers: list[tuple] = []
+    stepping = threading.Thread(target=lambda: answers.extend(there.step(action) for action in (5, 4, 8)))
+    stepping.start()
+    with observer(world) as bus:
+        wait_status(bus, lambda status: status.run.startswith("r.") and status.tick == 2, sim)
+    sim.kill()
+    sensors.kill()
+    sim, sensors = start(*words), start("sensors", "--name", world)
+    stepping.join()
+    for action, answer in zip((5, 4, 8), answers, strict=True):
+        expected = here.step(action)
+        np.testing.assert_array_equal(expected[0], answer[0])
+        assert (expected[1:4], expected[4]["tick"]) == (answer[1:4], answer[4]["tick"])
+    there.close()
+
+
 def test_a_program_that_forgets_to_close_ends_and_frees_the_seat(system, world):
     script = (
         f"import gymnasium; e = gymnasium.make({NAME!r}, connect='local', world={world!r}); e.reset(seed=1); e.step(4)"

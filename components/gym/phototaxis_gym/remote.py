@@ -142,11 +142,12 @@ class Link:
                 readings = event.message
                 if seated and readings.driver not in ("", self.ident):
                     raise Error(f"{readings.driver} holds the seat now; reset(seed=…) takes it back")
-                if seated and not readings.driver:
-                    self._seek("claim")  # a simulation that is back knows nothing of who drove
+                if seated and not readings.driver:  # a simulation that is back: once seated we learn what it obeyed
+                    self._seek("claim")
                 elif wanted(readings):
                     return readings
-                otherwise(readings)
+                else:
+                    otherwise(readings)
         missing = [role for role in ("sim", "sensors") if role not in self._present]
         why = f"{' and '.join(missing)} not there" if missing else "though all are there"
         raise Error(f"no readings within {self._timeout:g} s from {self._where}: {why}")

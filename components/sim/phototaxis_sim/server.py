@@ -357,5 +357,5 @@ class Server:
             self._record(self._sim.state)
             entry = msgspec.msgpack.decode(frame, type=Entry)
             self._advance(entry)
-            driver = entry.author
+            driver = entry.author or driver
         return driver
