@@ -13,7 +13,8 @@ from itertools import pairwise
 from typing import Any
 
 from phototaxis.bus import Bus
-from phototaxis.messages import Decoder, State, Status
+from phototaxis.codec import Decoder
+from phototaxis.messages import State, Status
 from phototaxis.session import BusOptions, open_session
 
 DEADLINE = 30.0

@@ -22,7 +22,8 @@ import handover
 import msgspec
 import numpy as np
 from phototaxis.arena import Arena, Disc, Light
-from phototaxis.messages import Command, Decoder, Message, Readings, State, World, encode
+from phototaxis.codec import Decoder, encode
+from phototaxis.messages import Command, Message, Readings, State, World
 from phototaxis.ports import free_ports
 from phototaxis.task import PERCEPTS
 from phototaxis_agent.crowd import CrowdAgent

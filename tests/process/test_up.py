@@ -10,7 +10,8 @@ import sys
 import msgspec
 import psutil
 import pytest
-from phototaxis.messages import Command, Control, Decoder, State
+from phototaxis.codec import Decoder
+from phototaxis.messages import Command, Control, State
 from phototaxis.ports import free_ports
 from phototaxis.session import BusOptions, open_session
 from phototaxis_launcher.cli import VERBS

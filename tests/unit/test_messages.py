@@ -2,7 +2,8 @@
 
 import msgspec
 import pytest
-from phototaxis.messages import SCHEMA, AgentLog, Command, Control, Decoder, Refused, SensorsLog, encode
+from phototaxis.codec import Decoder, Refused, encode
+from phototaxis.messages import SCHEMA, AgentLog, Command, Control, SensorsLog
 
 GOOD = {"run": "r", "tick": 3, "author": "a", "left": 0.5, "right": -1.0}
 decode = Decoder(Command, 200)

@@ -11,6 +11,7 @@ import msgspec
 from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import decode, encode, load, save
 from phototaxis.chunks import Chunks
+from phototaxis.codec import Refused
 from phototaxis.errors import UserError
 from phototaxis.journal import Journal
 from phototaxis.messages import (
@@ -22,7 +23,6 @@ from phototaxis.messages import (
     Control,
     Readings,
     ReadingsOfMany,
-    Refused,
     World,
 )
 from phototaxis.protocol import Once

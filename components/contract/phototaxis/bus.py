@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 import zenoh
 from zenoh.handlers import Callback
 
-from phototaxis.messages import ControlReply, Decoder, LogRequest, Message, Refused, encode
+from phototaxis.codec import Decoder, Refused, encode
+from phototaxis.messages import ControlReply, LogRequest, Message
 from phototaxis.topics import ROLES, TOPICS, Topic, alive_key
 
 GRACE = 0.5

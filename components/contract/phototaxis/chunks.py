@@ -9,7 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 from phototaxis.bus import Bus, Event
-from phototaxis.messages import LogRequest, Message, encode
+from phototaxis.codec import encode
+from phototaxis.messages import LogRequest, Message
 
 ROWS, SECONDS, KEPT = 16, 0.05, 2048
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from phototaxis.messages import Refused
+from phototaxis.codec import Refused
 
 REAL, COUNT, FLAG = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
 

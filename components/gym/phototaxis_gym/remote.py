@@ -10,10 +10,11 @@ import msgspec
 import numpy as np
 from gymnasium.error import Error
 from phototaxis.bus import Bus, Event
+from phototaxis.codec import Refused
 from phototaxis.columns import FLAG, pack, unpack
 from phototaxis.component import made_up
 from phototaxis.errors import UserError
-from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, Refused, Seed, World
+from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, Seed, World
 from phototaxis.options import convert
 from phototaxis.session import BusOptions, open_session
 from phototaxis.task import CrowdReadings

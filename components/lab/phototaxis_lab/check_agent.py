@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from phototaxis.bus import Bus, Event
+from phototaxis.codec import encode
 from phototaxis.errors import ComponentFailed, Unavailable
-from phototaxis.messages import Command, Control, ControlReply, Readings, Status, World, encode, run_name
+from phototaxis.messages import Command, Control, ControlReply, Readings, Status, World, run_name
 from phototaxis.session import BusOptions, open_session
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim import arenas

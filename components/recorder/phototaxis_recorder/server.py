@@ -5,7 +5,8 @@ from collections.abc import Callable
 from typing import Any
 
 from phototaxis.bus import Bus
-from phototaxis.messages import Decoder, LogRequest, Refused, World
+from phototaxis.codec import Decoder, Refused
+from phototaxis.messages import LogRequest, World
 from phototaxis.recordings import Summary
 from phototaxis.topics import ROLES, TOPICS
 

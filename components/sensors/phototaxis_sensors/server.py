@@ -6,19 +6,9 @@ from typing import Any, NamedTuple
 
 from phototaxis.bus import Bus
 from phototaxis.chunks import Chunks
+from phototaxis.codec import Decoder, Refused
 from phototaxis.columns import unpack
-from phototaxis.messages import (
-    Decoder,
-    LogRequest,
-    Readings,
-    ReadingsOfMany,
-    Refused,
-    SensorsLog,
-    SimLog,
-    State,
-    StateOfMany,
-    World,
-)
+from phototaxis.messages import LogRequest, Readings, ReadingsOfMany, SensorsLog, SimLog, State, StateOfMany, World
 from phototaxis.protocol import Once
 from phototaxis.topics import TOPICS
 

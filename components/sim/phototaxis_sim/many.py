@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from phototaxis.arena import Arena
+from phototaxis.codec import Refused
 from phototaxis.columns import COUNT, FLAG, pack, unpack
-from phototaxis.messages import ENDS, CommandOfMany, End, Episode, Refused, State, StateOfMany, World
+from phototaxis.messages import ENDS, CommandOfMany, End, Episode, State, StateOfMany, World
 
 from phototaxis_sim.crowd import Crowd
 from phototaxis_sim.physics import Physics, Pose

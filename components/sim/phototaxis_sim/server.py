@@ -10,18 +10,9 @@ from typing import Any
 import msgspec
 from phototaxis.bus import Bus, Event
 from phototaxis.chunks import Chunks
+from phototaxis.codec import Refused
 from phototaxis.journal import Journal
-from phototaxis.messages import (
-    Command,
-    CommandOfMany,
-    Control,
-    ControlReply,
-    Phase,
-    Refused,
-    SimLog,
-    State,
-    Status,
-)
+from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, Phase, SimLog, State, Status
 from phototaxis.protocol import Question
 
 from phototaxis_sim.many import SimulationOfMany
