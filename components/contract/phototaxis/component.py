@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from functools import partial
 from typing import Annotated
@@ -57,8 +57,8 @@ def run(
             return
         with ThreadPoolExecutor(len(buses)) as pool:
             served = [pool.submit(serve, bus) for bus in buses]
-            for one in as_completed(served):
-                if one.exception():
+            while wait(served, timeout=0.2).not_done:  # and signals are looked for
+                if any(one.done() and one.exception() for one in served):
                     stop()
         for one in served:
             one.result()
