@@ -98,6 +98,11 @@ def wait_status(bus: Bus, wanted: Callable[[Status], bool], *processes: Process)
     return wait(bus, lambda event: event.topic == "status" and wanted(event.message), *processes).message
 
 
+def wait_alive(bus: Bus, role: str, *processes: Process) -> None:
+    """Wait until the simulation knows a component of that role."""
+    wait_status(bus, lambda status: any(who.startswith(f"{role}/") for who in status.alive), *processes)
+
+
 def children(pid: int) -> dict[str, int]:
     """The component processes of a launcher: role → pid."""
     found = {}

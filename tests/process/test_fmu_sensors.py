@@ -14,7 +14,7 @@ from fmus import FAULTS, Built, described, edited, workers
 from phototaxis_sensors.fmu.build import build
 from phototaxis_sensors.fmu.examples import EXAMPLES
 from rerun_files import series
-from support import children, observer, phototaxis, result, wait_status
+from support import children, observer, phototaxis, result, wait_alive, wait_status
 
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
 
@@ -213,8 +213,10 @@ def test_an_fmu_takes_the_place_of_the_model_of_a_running_learner(fmu: Built, st
     place = ["--name", world]
     sim = start("sim", *place, "--seed", 3, "--epochs", 2000, "--run", "swapped")
     recorder = start("recorder", *place, "--output", tmp_path / "r.rrd", "--grpc-port", 0, "--web-port", -1)
-    first, agent = start("sensors", *place), start("agent", *place)
+    first = start("sensors", *place)
     with observer(world) as bus:
+        wait_alive(bus, "recorder", sim, first, recorder)
+        agent = start("agent", *place)
         wait_status(bus, lambda status: status.epoch > 500, sim, first, agent)
         assert first.stop() == 0
         second = start("sensors", *place, "--light-fmu", fmu("lag", 2))

@@ -17,7 +17,7 @@ from gymnasium.utils.env_checker import check_env
 from phototaxis.ports import free_ports
 from rerun_files import series
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
-from support import Process, observer, phototaxis, wait_status
+from support import Process, observer, phototaxis, wait_alive, wait_status
 
 NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
 PERCEPTS = ("simple", "rich", "continuous", "sensors")
@@ -29,7 +29,7 @@ def system(start: Callable[..., Process], world: str) -> Iterator[dict[str, Proc
     """A simulation and sensors that wait for a driver."""
     started = {role: start(role, "--name", world) for role in ("sim", "sensors")}
     with observer(world) as bus:
-        wait_status(bus, lambda status: any(who.startswith("sensors/") for who in status.alive), *started.values())
+        wait_alive(bus, "sensors", *started.values())
     yield started
     for process in started.values():
         process.kill()
@@ -241,7 +241,7 @@ def test_in_real_time_a_step_shows_what_its_action_did(start, world):
     """However long a learner takes: what came meanwhile is passed over, an answer that was late is given again."""
     system = start("sim", "--name", world, "--speed", 20), start("sensors", "--name", world)
     with observer(world) as bus:
-        wait_status(bus, lambda status: any(who.startswith("sensors/") for who in status.alive), *system)
+        wait_alive(bus, "sensors", *system)
         environment = make(world, action="continuous", percept="sensors")
         environment.reset(seed=1)
         place: Any = environment.unwrapped

@@ -16,7 +16,7 @@ from phototaxis.columns import FLAG, pack
 from phototaxis.messages import CommandOfMany, Control
 from phototaxis.session import BusOptions, open_session
 from rerun_files import series
-from support import children, observer, phototaxis, result, wait, wait_status
+from support import children, observer, phototaxis, result, wait, wait_alive, wait_status
 
 NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
 
@@ -31,7 +31,7 @@ def system(start, world):
             "sensors": start("sensors", "--name", world),
         }
         with observer(world) as bus:
-            wait_status(bus, lambda status: any(who.startswith("sensors/") for who in status.alive), *started.values())
+            wait_alive(bus, "sensors", *started.values())
         return started
 
     return begin

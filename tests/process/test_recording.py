@@ -10,7 +10,7 @@ from pathlib import Path
 
 from phototaxis.ports import free_ports
 from rerun_files import RERUN, newest_tick, salvaged, series
-from support import children, observer, phototaxis, result, wait, wait_status
+from support import children, observer, phototaxis, result, wait, wait_alive, wait_status
 
 
 def test_every_tick_is_in_the_recording(up):
@@ -82,10 +82,11 @@ def test_a_killed_recorder_loses_at_most_the_last_second(start, world, tmp_path)
         start("recorder", *place, "--output", tmp_path / "r.rrd", "--grpc-port", 0, "--web-port", -1),
         start("sim", *place, "--speed", speed),
         start("sensors", *place),
-        start("agent", *place),
     ]
     second = round(speed / 0.5)
     with observer(world) as bus:
+        wait_alive(bus, "recorder", *started)
+        started.append(start("agent", *place))
         for ticks in (second, second + 17, second + 38):
             status = wait_status(bus, lambda status, least=ticks: status.tick > 2 * least, *started)
         started[0].kill()
