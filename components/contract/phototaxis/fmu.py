@@ -16,10 +16,20 @@ class FmuOptions(Struct, kw_only=True):
     """OUR=THEIRS: our input or output is the FMU's variable of another name (may be repeated); with two FMUs
     light.OUR=THEIRS or sonar.OUR=THEIRS"""
     fmu_param: list[str] = []
-    """NAME=VALUE: a parameter of the FMU (may be repeated); with two FMUs light.NAME=VALUE or sonar.NAME=VALUE"""
+    """NAME=VALUE: the start value of a parameter of the FMU, or of an input that is not connected; of an array
+    VALUE,VALUE,… (may be repeated); with two FMUs light.NAME=VALUE or sonar.NAME=VALUE"""
+    fmu_step: Annotated[float, Meta(ge=0)] = 0.0
+    """seconds of one step of the FMU, of which the control period is a whole number; 0: as the FMU's description
+    wants it, or one step a control period"""
+    fmu_fresh: bool = False
+    """begin each episode with a fresh instance of the FMU, in place of a reset"""
+    fmu_log: bool = False
+    """switch the FMU's logging on and show what it says; otherwise its warnings alone are shown"""
     fmu_fallback: bool = False
     """go on with the built-in model when the FMU keeps failing, instead of ending"""
     fmu_timeout: Annotated[float, Meta(gt=0)] = 5.0
     """seconds after which an FMU that does not answer is ended"""
     allow_compile: bool = False
     """compile an FMU that comes as C source alone: this runs its author's build"""
+    allow_invalid: bool = False
+    """use an FMU whose description fails the validation against the standard's schema"""

@@ -16,6 +16,8 @@ from phototaxis.errors import UserError
 from phototaxis_sensors.fmu.examples import FOLDER, Example, Variable
 
 Version = Literal[2, 3]
+PLAIN_NAMES = [f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX" for version in (2, 3)]
+"""What the standard's headers want to hear when sources with a prefix of their own become a library."""
 UNITS = {"m": {"m": "1"}, "rad": {"rad": "1"}, "s": {"s": "1"}, "1": {}}
 
 
@@ -71,11 +73,14 @@ def compile_sources(archive: Path) -> None:
         when the C compiler is missing or does not accept the sources.
     """
     beside = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])  # cmake is there
+    flags = {name: " ".join([os.environ.get(name, ""), *PLAIN_NAMES]).strip() for name in ("CFLAGS", "CXXFLAGS")}
     command = [sys.executable, "-m", "fmpy", "compile", archive, "--generator", "Unix Makefiles"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ | {"PATH": beside})
+    environment = os.environ | flags | {"PATH": beside}
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False, env=environment)
     if done.returncode:
-        said = [line.strip() for line in (done.stdout + done.stderr).splitlines() if "error" in line.lower()]
-        raise UserError(f"the C sources do not compile: {said[0] if said else 'no reason given'} (needs gcc and make)")
+        lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+        said = [line for line in lines if "error" in line.lower()] or lines[-1:] or ["no reason given"]
+        raise UserError(f"the C sources do not compile: {said[0]} (needs gcc and make)")
 
 
 def _names(example: Example) -> str:

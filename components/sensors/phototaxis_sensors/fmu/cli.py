@@ -17,6 +17,8 @@ class Info(Struct, kw_only=True):
 
     file: str
     """the FMU"""
+    allow_invalid: bool = False
+    """show an FMU whose description fails the validation against the standard's schema"""
     json: bool = False
     """print it as one JSON object"""
 
@@ -31,11 +33,18 @@ class Check(Struct, kw_only=True):
     fmu_map: list[str] = []
     """OUR=THEIRS: our input or output is the FMU's variable of another name (may be repeated)"""
     fmu_param: list[str] = []
-    """NAME=VALUE: a parameter of the FMU (may be repeated)"""
+    """NAME=VALUE: the start value of a parameter of the FMU, or of an input that is not connected; of an array
+    VALUE,VALUE,… (may be repeated)"""
+    fmu_step: Annotated[float, Meta(ge=0)] = 0.0
+    """seconds of one step of the FMU, of which half a second is a whole number; 0: as the FMU's description wants it"""
+    fmu_fresh: bool = False
+    """begin each episode with a fresh instance of the FMU, in place of a reset"""
     fmu_timeout: Annotated[float, Meta(gt=0)] = 5.0
     """seconds after which an FMU that does not answer is ended"""
     allow_compile: bool = False
     """compile an FMU that comes as C source alone: this runs its author's build"""
+    allow_invalid: bool = False
+    """use an FMU whose description fails the validation against the standard's schema"""
     json: bool = False
     """print the result as one JSON object"""
 
@@ -71,13 +80,13 @@ def info(argv: Sequence[str]) -> int:
     from phototaxis_sensors.fmu.description import read
     from phototaxis_sensors.fmu.report import describe, text
 
-    found = describe(read(options.file))
+    found = describe(read(options.file, options.allow_invalid))
     print(json.dumps(found) if options.json else text(found))
     return 0
 
 
 def check(argv: Sequence[str]) -> int:
-    """Validation, then a dry run."""
+    """Validation, then a dry run with the FMU's logging on."""
     about = "Validate an FMU and drive a robot about with it: does it load, step, reset and repeat itself?"
     options = parse(Check, argv, "phototaxis fmu check", about, positional=["file"])
     from fmpy.validation import validate_fmu
@@ -87,7 +96,7 @@ def check(argv: Sequence[str]) -> int:
     from phototaxis_sensors.fmu.sensors import FmuSensors
     from phototaxis_sensors.fmu.wiring import SUITES, connect
 
-    fmu = read(options.file)
+    fmu = read(options.file, options.allow_invalid)
     remarks = validate_fmu(options.file)
     for remark in remarks:
         print(f"{options.file}: not as the standard has it: {remark}", file=sys.stderr)
@@ -105,7 +114,7 @@ def check(argv: Sequence[str]) -> int:
             sensors.close()
         if not options.json:
             print("{kind}: {ticks} ticks in {episodes} episodes, readings {low:.3g} to {high:.3g}, "
-                  "{microseconds:.0f} µs a tick; the same again after a reset".format(**results[-1]))  # fmt: skip
+                  "{microseconds:.0f} µs a tick; the same again after {begins}".format(**results[-1]))  # fmt: skip
     if options.json:
         print(json.dumps({"file": options.file, "remarks": remarks, "runs": results}))
     return 0
@@ -117,8 +126,12 @@ def _as(kind: str, options: Check) -> FmuOptions:
         sonar_fmu=options.file if kind == "sonar" else "",
         fmu_map=options.fmu_map,
         fmu_param=options.fmu_param,
+        fmu_step=options.fmu_step,
+        fmu_fresh=options.fmu_fresh,
+        fmu_log=True,
         fmu_timeout=options.fmu_timeout,
         allow_compile=options.allow_compile,
+        allow_invalid=options.allow_invalid,
     )
 
 

@@ -1,5 +1,7 @@
 """Reads an FMU and says clearly what is wrong with it, before any of its code runs."""
 
+import stat
+import sys
 import zipfile
 import zlib
 from pathlib import Path
@@ -52,9 +54,16 @@ class Fmu(NamedTuple):
         """The variable of that name."""
         return next((one for one in self.description.modelVariables if one.name == name), None)
 
+    def listed(self, causality: str) -> str:
+        """The first variables of a causality, for a message."""
+        names = [one.name for one in self.description.modelVariables if one.causality == causality]
+        return ", ".join([*names[:8], *(["…"] if len(names) > 8 else [])]) or "none"
 
-def read(path: str) -> Fmu:
+
+def read(path: str, allow_invalid: bool = False) -> Fmu:
     """Read an FMU's description without running or unpacking anything.
+
+    With `allow_invalid` one that is not as the standard's schema has it is said to be so, and used.
 
     Raises
     ------
@@ -66,30 +75,47 @@ def read(path: str) -> Fmu:
         with zipfile.ZipFile(file) as archive:
             members = archive.namelist()
             size = sum(one.file_size for one in archive.infolist())
-            if "modelDescription.xml" not in members:
-                raise UserError(f"{path}: not an FMU: it has no modelDescription.xml")
+            _well_packed(path, archive)
             try:
                 version = _version(path, archive)
             except UNPACKING as error:
                 raise UserError(f"{path}: cannot be unpacked: {error}") from None
     except FileNotFoundError:
         raise UserError(f"{path}: there is no such file") from None
-    except (zipfile.BadZipFile, IsADirectoryError):
+    except (zipfile.BadZipFile, UnicodeError, IsADirectoryError):
         raise UserError(f"{path}: not an FMU: it is not a zip archive") from None
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
     if size > LARGEST:
         raise UserError(f"{path}: {size / 1e9:.1f} GB when unpacked; at most {LARGEST / 1e9:g} GB are allowed")
-    description = _describe(path)
+    description = _describe(path, allow_invalid)
     interface = description.coSimulation
     if interface is None:
-        raise UserError(f"{path}: made for Model Exchange alone; needed is an FMU for Co-Simulation")
+        others = {"Model Exchange": description.modelExchange, "Scheduled Execution": description.scheduledExecution}
+        made = " and ".join(name for name, other in others.items() if other is not None) or "no kind of simulation"
+        raise UserError(f"{path}: made for {made} alone; needed is an FMU for Co-Simulation")
     place = fmpy.platform if version == 2 else fmpy.platform_tuple
     library = f"binaries/{place}/{interface.modelIdentifier}{fmpy.sharedLibraryExtension}"
     parts = [member.split("/") for member in members]
     platforms = sorted({part[1] for part in parts if part[0] == "binaries" and len(part) > 2 and part[2]})
     sources = any(part[0] == "sources" and part[-1].endswith((".c", ".cpp")) for part in parts)
     return Fmu(file, version, description, interface, library, platforms, sources, library in members)
+
+
+def _well_packed(path: str, archive: zipfile.ZipFile) -> None:
+    members = archive.infolist()
+    for one in members:
+        if "\\" in one.orig_filename:
+            raise UserError(
+                f"{path}: wrongly packed: {one.orig_filename} has backslashes, which no archive of an FMU may"
+            )
+        if stat.S_ISLNK(one.external_attr >> 16):
+            raise UserError(f"{path}: wrongly packed: {one.filename} is a symbolic link; pack the file itself")
+    names = [one.filename for one in members]
+    if "modelDescription.xml" not in names:
+        deeper = next((name for name in names if name.lower().split("/")[-1] == "modeldescription.xml"), "")
+        there = f"; {deeper} is not where it belongs, or not its name" if deeper else ""
+        raise UserError(f"{path}: not an FMU: it has no modelDescription.xml{there}")
 
 
 def _version(path: str, archive: zipfile.ZipFile) -> int:
@@ -103,16 +129,21 @@ def _version(path: str, archive: zipfile.ZipFile) -> int:
     return int(said[0])
 
 
-def _describe(path: str) -> ModelDescription:
+def _describe(path: str, allow_invalid: bool) -> ModelDescription:
     try:
-        return read_model_description(path)
-    except ValidationError as error:
-        problem, more = error.problems[0], len(error.problems) - 1
-        raise UserError(
-            f"{path}: its modelDescription.xml is not valid: {problem}{f' (and {more} more)' if more else ''}"
-        ) from None
+        try:
+            return read_model_description(path)
+        except ValidationError as error:
+            problem, more = error.problems[0], len(error.problems) - 1
+            line = f"{path}: its modelDescription.xml is not valid: {problem}{f' (and {more} more)' if more else ''}"
+            if not allow_invalid:
+                raise UserError(f"{line}; --allow-invalid uses it all the same") from None
+            print(f"sensors: {line}; it is used all the same", file=sys.stderr, flush=True)
+            return read_model_description(path, validate=False)
+    except UserError:
+        raise
     except Exception as error:  # fmpy raises bare ones
-        raise UserError(f"{path}: its modelDescription.xml cannot be used: {error}") from None
+        raise UserError(f"{path}: its modelDescription.xml cannot be used: {' '.join(str(error).split())}") from None
 
 
 def require_library(fmu: Fmu, allow_compile: bool) -> None:

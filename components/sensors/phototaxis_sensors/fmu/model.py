@@ -1,5 +1,6 @@
 """An FMU as a sensor model: stepped once a tick, begun anew with each episode, restarted when it fails."""
 
+import math
 import sys
 import time
 from collections import deque
@@ -11,11 +12,15 @@ from phototaxis.errors import ComponentFailed
 
 from phototaxis_sensors.fmu.host import Failed, Host, Team
 from phototaxis_sensors.fmu.rigs import Rig
-from phototaxis_sensors.fmu.wiring import Wire, Wiring, bounds, size
+from phototaxis_sensors.fmu.start import bounds
+from phototaxis_sensors.fmu.wiring import Wire, Wiring, size
 from phototaxis_sensors.model import BuiltIn, Moment, SensorModel
 
 RESTARTS, WITHIN = 3, 60.0
 """An FMU that fails more than so many times within so many seconds keeps failing."""
+ROUNDING = 1e-6
+"""What an output may be beyond its limits, relative to them: enough for sums in single precision."""
+LARGEST = sys.float_info.max
 REMEMBERED = 100_000
 """Ticks of an episode that are kept to bring a restarted FMU to the present."""
 
@@ -35,6 +40,7 @@ class Stepped:
     ----------
     host : runs them.
     wiring : how one of them is connected.
+    in_time : seconds that a tick may take before it is called slow.
     label : names it in messages, as in "light FMU lag.fmu".
     fallback : give it up when it keeps failing; otherwise that is an error.
 
@@ -43,8 +49,9 @@ class Stepped:
     failed : it has been given up.
     """
 
-    def __init__(self, host: Host | Team, wiring: Wiring, label: str, fallback: bool):
+    def __init__(self, host: Host | Team, wiring: Wiring, in_time: float, label: str, fallback: bool):
         self.label, self._host, self._fallback, self.failed = label, host, fallback, False
+        self._in_time = in_time
         self._episode, self._tick = -1, -1
         self._steps: deque[Step] = deque(maxlen=REMEMBERED)
         self._failures: deque[float] = deque(maxlen=RESTARTS + 1)
@@ -70,15 +77,24 @@ class Stepped:
         step = Step(1 if fresh else tick - self._tick, inputs)
         self._steps.append(step)
         self._episode, self._tick = episode, tick
+        began = time.monotonic()
         try:
             if fresh:
                 self._host.begin(inputs)
             outputs = self._checked(self._host.step(inputs, step.periods))
+            if time.monotonic() - began > self._in_time:
+                self._slow(time.monotonic() - began)
         except Failed as why:
             outputs = self._again(why)
         if outputs is None or self._plain:
             return outputs
         return [(value - wire.offset) / wire.factor for value, wire in zip(outputs, cycle(self._outputs), strict=False)]
+
+    def _slow(self, seconds: float) -> None:
+        """Say once that it cannot keep up with real time."""
+        line = f"took {seconds:.2g} s for tick {self._tick}; in real time a tick lasts {self._in_time:g} s"
+        print(f"sensors: {self.label}: {line}", file=sys.stderr, flush=True)
+        self._in_time = math.inf
 
     def _again(self, why: Failed) -> Sequence[float] | None:
         """Restart it and lead it through the episode again, or give it up."""
@@ -97,7 +113,7 @@ class Stepped:
             if len(self._steps) == REMEMBERED:
                 self.anew = self._tick
             try:
-                self._host.start()
+                self._host.start(logging=True)
                 self._host.begin(self._steps[0].inputs)
                 outputs: Sequence[float] = ()
                 for step in self._steps:
@@ -107,19 +123,39 @@ class Stepped:
                 why = error
 
     def _checked(self, outputs: Sequence[float]) -> Sequence[float]:
-        for place, (value, (low, high)) in enumerate(zip(outputs, cycle(self._limits), strict=False)):
+        """The outputs; what is beyond its limits by rounding alone is put back to them."""
+        for value, (low, high) in zip(outputs, cycle(self._limits), strict=False):
             if not low <= value <= high:  # neither is NaN
-                self._host.stop()
-                name = self._outputs[place % len(self._outputs)].variable.name
-                raise Failed(f"its {name} is {value:g}, not in {low:g} to {high:g}")
+                return self._clipped(outputs)
         return outputs
+
+    def _clipped(self, outputs: Sequence[float]) -> Sequence[float]:
+        clipped = []
+        for value, (low, high), wire in zip(outputs, cycle(self._limits), cycle(self._outputs), strict=False):
+            if not low - _rounding(low, wire) <= value <= high + _rounding(high, wire):
+                self._host.stop()
+                raise Failed(f"its {wire.variable.name} is {value:g}, {_words(low, high)}")
+            clipped.append(min(max(value, low), high))
+        return clipped
 
 
 def _limits(wire: Wire) -> tuple[float, float]:
-    """What an output may be, in its own unit: as declared, finite, and not below our 0."""
+    """What an output may be, in its own unit: as declared, and finite."""
     low, high = bounds(wire.variable)
-    largest = sys.float_info.max
-    return max(low, wire.offset - 1e-9 * wire.factor), min(high, largest)
+    return max(low, -LARGEST), min(high, LARGEST)
+
+
+def _rounding(limit: float, wire: Wire) -> float:
+    """How far beyond a limit is rounding: relative to the limit, or to one of our units where it is 0."""
+    return ROUNDING * max(abs(limit), abs(wire.factor)) if abs(limit) < LARGEST else 0.0
+
+
+def _words(low: float, high: float) -> str:
+    if (low, high) == (-LARGEST, LARGEST):
+        return "not a finite number"
+    if high == LARGEST:
+        return f"below {low:g}"
+    return f"above {high:g}" if low == -LARGEST else f"not in {low:g} to {high:g}"
 
 
 class FmuModel:

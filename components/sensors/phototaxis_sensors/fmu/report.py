@@ -10,7 +10,8 @@ from phototaxis.errors import UserError
 
 from phototaxis_sensors.fmu.description import Fmu
 from phototaxis_sensors.fmu.sensors import FmuSensors
-from phototaxis_sensors.fmu.wiring import SUITES, Suite, bounds, connect, declared_unit
+from phototaxis_sensors.fmu.start import bounds
+from phototaxis_sensors.fmu.wiring import SUITES, Suite, connect, declared_unit
 from phototaxis_sensors.model import Past, SensorModel
 from phototaxis_sensors.scene import Scene
 
@@ -118,11 +119,13 @@ def dry_run(sensors: FmuSensors, kind: str) -> dict[str, Any]:
             twice.append([list(model(Past(at * EPISODE + i, at, *way))) for i, way in enumerate(ways)])
             spent += time.perf_counter() - began
         if twice[0] != twice[1]:
-            raise UserError("after a reset the same inputs give other readings: runs with this FMU cannot be repeated")
+            raise UserError(
+                f"after {sensors.begins} the same inputs give other readings: runs with this FMU cannot be repeated"
+            )
         readings += [value for one in twice[0] for value in one]
     ticks = 2 * EPISODE * EPISODES
     low, high = min(readings), max(readings)
     return {
         "kind": kind, "ticks": ticks, "episodes": 2 * EPISODES, "low": low, "high": high,
-        "microseconds": spent / ticks * 1e6,
+        "microseconds": spent / ticks * 1e6, "begins": sensors.begins,
     }  # fmt: skip

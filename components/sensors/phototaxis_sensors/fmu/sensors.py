@@ -1,7 +1,6 @@
 """Puts FMUs in the place of the built-in sensor models, as the options say."""
 
-import sys
-from collections.abc import Mapping, Sequence
+import math
 from typing import NamedTuple
 
 from phototaxis.arena import Arena
@@ -9,11 +8,14 @@ from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
 
+from phototaxis_sensors.fmu.assign import assign
 from phototaxis_sensors.fmu.build import compiled
 from phototaxis_sensors.fmu.crowd import Crew, FmuCrowd
 from phototaxis_sensors.fmu.description import Fmu, read, require_library
-from phototaxis_sensors.fmu.host import Failed, Host, Team, stay_on_one_cpu
+from phototaxis_sensors.fmu.host import Failed, Host, Team, Terms, stay_on_one_cpu
+from phototaxis_sensors.fmu.log import Log
 from phototaxis_sensors.fmu.model import FmuModel, Stepped
+from phototaxis_sensors.fmu.pace import pace
 from phototaxis_sensors.fmu.rigs import Beams, Filters, Lamps, Rig
 from phototaxis_sensors.fmu.wiring import SUITES, Wiring, connect
 from phototaxis_sensors.light import Sights
@@ -56,21 +58,25 @@ class FmuSensors:
     def __init__(self, options: FmuOptions, one_cpu: bool = False):
         self._options, self._one_cpu = options, one_cpu
         files = {"light": options.light_fmu, "sonar": options.sonar_fmu}
-        given = [kind for kind, file in files.items() if file]
-        names, parameters = _pairs("fmu-map", options.fmu_map, given), _pairs("fmu-param", options.fmu_param, given)
+        fmus = {kind: read(file, options.allow_invalid) for kind, file in files.items() if file}
+        names, parameters = assign(options.fmu_map, options.fmu_param, fmus)
         self._wired: dict[str, Wired] = {}
-        for kind in given:
-            fmu = read(files[kind])
+        for kind, fmu in fmus.items():
             wiring = connect(fmu, SUITES[kind], names[kind], parameters[kind])
             require_library(fmu, options.allow_compile)
             self._wired[kind] = Wired(kind, fmu, wiring, None if fmu.compiled else compiled(fmu.file))
         self._running: list[Host | Team] = []
 
-    def try_out(self, period: float = 0.1) -> None:
+    def try_out(self) -> None:
         """Load each FMU once, so that what is wrong is said before a run."""
         for wired in self._wired.values():
-            self._host(wired, 1, period)
+            self._host(wired, 1, self._options.fmu_step or 1.0, quiet=True)
         self.close()
+
+    @property
+    def begins(self) -> str:
+        """What the episodes of the FMU begin with, as in "a reset"; an FMU that cannot be reset is found out in use."""
+        return self._running[0].begins
 
     def __call__(self, arena: Arena, scene: Scene) -> Models:
         """The models for an arena; those made before are ended."""
@@ -94,7 +100,6 @@ class FmuSensors:
         for kind, wired in self._wired.items():
             sensors = len(arena.robot.sonars) // wired.wiring.width if kind == "sonar" else 2
             each = sensors * (len(arena.lights) if kind == "light" and wired.wiring.ports != ["raw"] else 1)
-            self._warn(wired, arena.motion.control_period)
             host = self._host(wired, count * each, arena.motion.control_period)
             crews[kind] = Crew(self._stepped(host, wired), wired.wiring)
         return FmuCrowd(world, crews.get("sonar"), crews.get("light"))
@@ -104,18 +109,23 @@ class FmuSensors:
         while self._running:
             self._running.pop().stop()
 
-    def _host(self, wired: Wired, instances: int, period: float) -> Host | Team:
+    def _host(self, wired: Wired, instances: int, period: float, quiet: bool = False) -> Host | Team:
+        """Processes that have loaded the FMU; `quiet`: without a remark on its steps."""
         options = self._options
-        rest = period, options.fmu_timeout, wired.archive
         if wired.fmu.once and instances > PROCESSES:
             raise UserError(
                 f"{wired.fmu.file}: a process can have it once, and {instances} instances are needed; "
                 f"at most {PROCESSES} processes are started (with evaluate: fewer --placements)"
             )
+        log = Log(wired.label, options.fmu_log)
+        found = pace(wired.fmu.description, period, options.fmu_step)
+        if found.remark and not quiet:
+            log.tell(found.remark)
+        terms = Terms(wired.fmu, wired.wiring, found, log, options.fmu_timeout, options.fmu_fresh, wired.archive)
         if wired.fmu.once and instances > 1:
-            host = Team([Host(wired.fmu, wired.wiring, 1, *rest) for _ in range(instances)])
+            host = Team([Host(terms, 1) for _ in range(instances)])
         else:
-            host = Host(wired.fmu, wired.wiring, instances, *rest)
+            host = Host(terms, instances)
         try:
             host.start()
         except Failed as why:
@@ -124,39 +134,10 @@ class FmuSensors:
         self._running.append(host)
         return host
 
-    def _warn(self, wired: Wired, period: float) -> None:
-        """Say so when the FMU would rather be stepped otherwise."""
-        experiment = wired.fmu.description.defaultExperiment
-        step = float(experiment.stepSize) if experiment is not None and experiment.stepSize else period
-        if step != period:
-            line = f"{wired.label} suggests steps of {step:g} s; it gets steps of {period:g} s, the control period"
-            print(f"sensors: {line}", file=sys.stderr, flush=True)
-
     def _model(self, wired: Wired, arena: Arena, rig: Rig, builtin: SensorModel) -> FmuModel:
-        self._warn(wired, arena.motion.control_period)
-        host = self._host(wired, rig.instances, arena.motion.control_period)
-        return FmuModel(self._stepped(host, wired), rig, builtin, wired.fmu.name)
+        period = arena.motion.control_period
+        host = self._host(wired, rig.instances, period)
+        return FmuModel(self._stepped(host, wired, period), rig, builtin, wired.fmu.name)
 
-    def _stepped(self, host: Host | Team, wired: Wired) -> Stepped:
-        return Stepped(host, wired.wiring, wired.label, self._options.fmu_fallback)
-
-
-def _pairs(flag: str, items: Sequence[str], given: Sequence[str]) -> Mapping[str, dict[str, str]]:
-    """NAME=VALUE options of each FMU."""
-    found: dict[str, dict[str, str]] = {kind: {} for kind in given}
-    for item in items:
-        name, equals, value = item.partition("=")
-        kind, dot, rest = name.partition(".")
-        if not equals or not name:
-            raise UserError(f"--{flag} {item}: expected NAME=VALUE")
-        if not given:
-            raise UserError(f"--{flag} {item}: there is no FMU; give --light-fmu or --sonar-fmu")
-        if dot and kind in SUITES:
-            if kind not in found:
-                raise UserError(f"--{flag} {item}: there is no --{kind}-fmu")
-            found[kind][rest] = value
-        elif len(given) > 1:
-            raise UserError(f"--{flag} {item}: of which FMU? say light.{name}=… or sonar.{name}=…")
-        else:
-            found[given[0]][name] = value
-    return found
+    def _stepped(self, host: Host | Team, wired: Wired, in_time: float = math.inf) -> Stepped:
+        return Stepped(host, wired.wiring, in_time, wired.label, self._options.fmu_fallback)

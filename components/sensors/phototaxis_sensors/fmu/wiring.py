@@ -2,16 +2,18 @@
 
 import math
 import re
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Container, Mapping
+from typing import NamedTuple
 
 from fmpy.model_description import ModelVariable, Unit
 from phototaxis.errors import UserError
 
 from phototaxis_sensors.fmu.description import Fmu
+from phototaxis_sensors.fmu.instance import Parameter
+from phototaxis_sensors.fmu.start import start_value
 
 DIMENSIONS = ("kg", "m", "s", "A", "K", "mol", "cd")  # an angle has none
-REAL = {2: ("Real",), 3: ("Float64",)}
+REAL = {2: ("Real",), 3: ("Float64", "Float32")}
 BEAMS = 16
 
 
@@ -68,14 +70,6 @@ class Wire(NamedTuple):
     offset: float
 
 
-class Parameter(NamedTuple):
-    """A parameter of the FMU and its value."""
-
-    kind: str
-    reference: int
-    value: Any
-
-
 class Wiring(NamedTuple):
     """How one instance of an FMU is connected."""
 
@@ -109,11 +103,15 @@ def connect(fmu: Fmu, suite: Suite, names: Mapping[str, str], parameters: Mappin
     for ours in names:
         if ours not in known:
             raise UserError(f"--fmu-map {ours}=…: the {suite.name} model has no '{ours}', but {', '.join(known)}")
+    start = [start_value(fmu, *pair) for pair in parameters.items()]  # they may change the sizes of arrays
     inputs = [wire for port in suite.inputs for wire in _find(fmu, suite, port, "input", names)]
     if not inputs:
-        inputs = _only(fmu, suite.raw, "input")
+        inputs = _only(fmu, suite.raw, "input", parameters)
     outputs = _find(fmu, suite, suite.output, "output", names) or _only(fmu, suite.output, "output")
-    wiring = Wiring(inputs, outputs, [_parameter(fmu, *pair) for pair in parameters.items()])
+    for wire in inputs:
+        if wire.variable.name in parameters:
+            raise UserError(f"{fmu.file}: {wire.variable.name} is given our {wire.port}; it cannot have a value too")
+    wiring = Wiring(inputs, outputs, start)
     if suite.raw.name in wiring.ports and len(wiring.ports) > 1:
         raise UserError(f"{fmu.file}: a filter of {suite.raw.name} cannot have {wiring.ports[0]} too")
     if len({wiring.width, *(_count(wiring, port) for port in wiring.ports)}) > 1:
@@ -141,7 +139,7 @@ def _find(fmu: Fmu, suite: Suite, port: Port, causality: str, names: Mapping[str
     plain = fmu.variable(theirs)
     found = [plain] if plain else _numbered(fmu, theirs)
     if not found and port.name in names:
-        raise UserError(f"{fmu.file}: has no variable '{theirs}'; its {causality}s are {_listed(fmu, causality)}")
+        raise UserError(f"{fmu.file}: has no variable '{theirs}'; its {causality}s are {fmu.listed(causality)}")
     for variable in found:
         _fits(fmu, variable, causality)
     if found and sum(map(_size, found)) not in (1, suite.width):
@@ -161,31 +159,31 @@ def _numbered(fmu: Fmu, name: str) -> list[ModelVariable]:
     return [found[number] for number in numbers] if gapless else []
 
 
-def _only(fmu: Fmu, port: Port, causality: str) -> list[Wire]:
-    """The one real input or output that there is."""
+def _only(fmu: Fmu, port: Port, causality: str, given: Container[str] = ()) -> list[Wire]:
+    """The one real input or output that there is, apart from those that are given a value."""
     real = [
         variable
         for variable in fmu.description.modelVariables
-        if variable.causality == causality and variable.type in REAL[fmu.version] and _size(variable) == 1
+        if variable.causality == causality
+        and variable.type in REAL[fmu.version]
+        and _size(variable) == 1
+        and variable.name not in given
     ]
     if len(real) != 1:
         raise UserError(
             f"{fmu.file}: none of its variables is called {port.name}, and which {causality} it is, is not clear; "
-            f"say --fmu-map {port.name}=NAME; its {causality}s are {_listed(fmu, causality)}"
+            f"say --fmu-map {port.name}=NAME; its {causality}s are {fmu.listed(causality)}"
         )
     return [_wire(fmu, port, real[0])]
-
-
-def _listed(fmu: Fmu, causality: str) -> str:
-    names = [one.name for one in fmu.description.modelVariables if one.causality == causality]
-    return ", ".join([*names[:8], *(["…"] if len(names) > 8 else [])]) or "none"
 
 
 def _fits(fmu: Fmu, variable: ModelVariable, causality: str) -> None:
     if variable.causality != causality:
         raise UserError(f"{fmu.file}: {variable.name} is of causality {variable.causality}; needed is {causality}")
     if variable.type not in REAL[fmu.version]:
-        raise UserError(f"{fmu.file}: {variable.name} is of type {variable.type}; needed is {REAL[fmu.version][0]}")
+        raise UserError(
+            f"{fmu.file}: {variable.name} is of type {variable.type}; needed is {' or '.join(REAL[fmu.version])}"
+        )
 
 
 def _wire(fmu: Fmu, port: Port, variable: ModelVariable) -> Wire:
@@ -206,37 +204,5 @@ def declared_unit(variable: ModelVariable) -> str | None:
     return variable.unit or (variable.declaredType.unit if variable.declaredType else None)
 
 
-def bounds(variable: ModelVariable) -> tuple[float, float]:
-    """The declared minimum and maximum of a variable or of its declared type."""
-    low = variable.min or (variable.declaredType.min if variable.declaredType else None)
-    high = variable.max or (variable.declaredType.max if variable.declaredType else None)
-    return -math.inf if low is None else float(low), math.inf if high is None else float(high)
-
-
 def _dimensions(unit: Unit) -> dict[str, int]:
     return {name: getattr(unit.baseUnit, name) for name in DIMENSIONS if getattr(unit.baseUnit, name)}
-
-
-def _parameter(fmu: Fmu, name: str, text: str) -> Parameter:
-    variable = fmu.variable(name)
-    if variable is None or variable.causality != "parameter":
-        raise UserError(f"{fmu.file}: has no parameter '{name}'; its parameters are {_listed(fmu, 'parameter')}")
-    kind = variable.type
-    try:
-        if kind == "Boolean":
-            value: Any = {"true": True, "1": True, "false": False, "0": False}[text.lower()]
-        elif kind == "Enumeration":
-            items = {item.name: item.value for item in variable.declaredType.items} if variable.declaredType else {}
-            value = int(items.get(text) or text)
-        elif kind == "String":
-            value = text
-        else:
-            value = float(text) if kind in ("Real", "Float32", "Float64") else int(text)
-    except (ValueError, KeyError):
-        raise UserError(f"--fmu-param {name}={text}: {name} is of type {kind}") from None
-    if _size(variable) > 1 or kind in ("Binary", "Clock"):
-        raise UserError(f"--fmu-param {name}={text}: {name} is no single number, word or truth value")
-    low, high = bounds(variable)
-    if isinstance(value, float | int) and not low <= value <= high:
-        raise UserError(f"--fmu-param {name}={text}: out of its range {low:g} to {high:g}")
-    return Parameter(kind, variable.valueReference, value)
