@@ -39,6 +39,8 @@ class Check(Struct, kw_only=True):
     """seconds of one step of the FMU, of which half a second is a whole number; 0: as the FMU's description wants it"""
     fmu_fresh: bool = False
     """begin each episode with a fresh instance of the FMU, in place of a reset"""
+    fmu_log: bool = False
+    """show more of what the FMU says than its first lines"""
     fmu_timeout: Annotated[float, Meta(gt=0)] = 5.0
     """seconds after which an FMU that does not answer is ended"""
     allow_compile: bool = False
@@ -107,7 +109,7 @@ def check(argv: Sequence[str]) -> int:
         connect(fmu, SUITES["light"], {}, {})
     results = []
     for kind in kinds:
-        sensors = FmuSensors(_as(kind, options))
+        sensors = FmuSensors(_as(kind, options), logging=True)
         try:
             results.append(dry_run(sensors, kind))
         finally:
@@ -128,7 +130,7 @@ def _as(kind: str, options: Check) -> FmuOptions:
         fmu_param=options.fmu_param,
         fmu_step=options.fmu_step,
         fmu_fresh=options.fmu_fresh,
-        fmu_log=True,
+        fmu_log=options.fmu_log,
         fmu_timeout=options.fmu_timeout,
         allow_compile=options.allow_compile,
         allow_invalid=options.allow_invalid,

@@ -190,7 +190,6 @@ class Host:
             inputs=ends([_end(wire) for wire in wiring.inputs]), outputs=ends([_end(wire) for wire in wiring.outputs]),
             parameters=wiring.parameters, step=pace.step, times=pace.times, fresh=self._terms.fresh, once=fmu.once,
             logging=self._logging, least=0 if self._terms.log.everything else 1,
-            categories=[category.name for category in fmu.description.logCategories if category.name],
         )  # fmt: skip
 
     def _unpack(self, folder: str) -> None:

@@ -60,8 +60,6 @@ class Setup(msgspec.Struct):
     """The FMU's logging is on."""
     least: int
     """Status from which on the FMU's messages are passed on."""
-    categories: list[str]
-    """What the FMU can log."""
 
 
 class Broken(Exception):
@@ -93,7 +91,7 @@ class Part(NamedTuple):
 
     call: Callable[..., Any]
     references: Any
-    count: int
+    number: int
     values: Any
     more: tuple[int, ...]
     doubles: Any
@@ -160,7 +158,7 @@ class Instance:
                 raise Broken(f"{'terminated' if found[1] else 'returned early'} at {self._time:g} s")
             self._time += step
         for part in self._outputs:
-            part.call(fmu.component, part.references, part.count, part.values, *part.more)
+            part.call(fmu.component, part.references, part.number, part.values, *part.more)
             if part.doubles is not None:
                 part.doubles[:] = part.values[:]
 
@@ -196,7 +194,7 @@ class Instance:
         for part in self._inputs:
             if part.doubles is not None:
                 part.values[:] = part.doubles[:]
-            part.call(self._fmu.component, part.references, part.count, part.values, *part.more)
+            part.call(self._fmu.component, part.references, part.number, part.values, *part.more)
 
     def _free(self) -> None:
         """Free the instance and keep the library: to load it again and again leaks, or crashes."""
@@ -251,9 +249,9 @@ class Instance:
             raise
         except Exception:  # fmpy raises bare ones
             raise Broken("cannot be instantiated") from None
-        if self._setup.logging and self._setup.categories:
+        if self._setup.logging:
             with suppress(FMICallException):
-                self._fmu.setDebugLogging(True, self._setup.categories)
+                self._fmu.setDebugLogging(True, [])  # of every category; to name them would leave out what has none
 
 
 def _callbacks2(voice: Voice) -> Any:

@@ -1,8 +1,9 @@
 """What an FMU says, logged or printed: one line each, for the user, and no more than a person can read."""
 
+import os
 import sys
 import threading
-from io import BufferedReader
+from typing import IO
 
 SHOWN, SHOWN_ON_REQUEST = 20, 1000
 """Most lines of an FMU that are shown: without and with its logging on."""
@@ -10,6 +11,8 @@ LONGEST = 600
 """Most characters of a line; a longer one loses its middle."""
 RAW = 8 * LONGEST
 """Most bytes of a line that are looked at."""
+CHUNK = 65536
+"""Bytes that are read at once."""
 MARK = b"\x1e"
 """Begins a line of the FMU's logger, before its status; other lines were printed."""
 STATUS = ("info", "warning", "discard", "error", "fatal error", "pending")
@@ -25,42 +28,39 @@ def one_line(said: bytes) -> str:
 
 
 class Log:
-    """Shows on standard error what an FMU says, up to a number of lines.
+    """Shows on standard error what an FMU says, up to a number of lines; the same line again is not shown.
 
     Parameters
     ----------
     label : names the FMU, as in "light FMU lag.fmu".
     everything : its logging is on from the beginning, and what is no warning is shown too.
+    most : number of lines.
     """
 
-    def __init__(self, label: str, everything: bool = False):
+    def __init__(self, label: str, everything: bool = False, most: int = SHOWN):
         self.label, self.everything = label, everything
-        self._left = SHOWN_ON_REQUEST if everything else SHOWN
-        self._told = ""
+        self._most, self._shown, self._last = most, 0, ""
         self._lock = threading.Lock()  # an FMU may have several processes
 
+    @property
+    def full(self) -> bool:
+        """No more is shown."""
+        return self._shown > self._most
+
     def tell(self, line: str) -> None:
-        """Say something of the FMU ourselves; the same again, of another of its processes, is not said."""
-        if line != self._told:
-            self._told = line
-            self._show(line)
+        """Say something of the FMU ourselves."""
+        if line != self._last:
+            self._last = line
+            print(f"sensors: {self.label} {line}", file=sys.stderr, flush=True)
 
-    def heard(self, said: bytes) -> str:
-        """Show one line of it; what it said, in words."""
-        kind = "printed"
-        if said.startswith(MARK):
-            kind, said = STATUS[min(said[1] - ord("0"), len(STATUS) - 1)], said[2:]
-        text = one_line(said)
+    def heard(self, said: str) -> None:
+        """Show a line of its own."""
         with self._lock:
-            self._left -= 1 if text else 0
-            if text and self._left >= 0:
-                self._show(f"{'' if kind == 'printed' else 'logs '}{kind}: {text}")
-            elif text and self._left == -1:
-                self._show(f"says more, which is not shown{'' if self.everything else ' (--fmu-log shows more)'}")
-        return text
-
-    def _show(self, line: str) -> None:
-        print(f"sensors: {self.label} {line}", file=sys.stderr, flush=True)
+            if self.full or said == self._last:
+                return
+            self._shown += 1
+            more = "" if self._most >= SHOWN_ON_REQUEST else " (--fmu-log shows more)"
+            self.tell(f"says more, which is not shown{more}" if self.full else said)
 
 
 class Listener:
@@ -71,7 +71,7 @@ class Listener:
     last : what it said last; "" for nothing.
     """
 
-    def __init__(self, stream: BufferedReader, log: Log):
+    def __init__(self, stream: IO[bytes], log: Log):
         self._stream, self._log, self.last = stream, log, ""
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
@@ -82,14 +82,19 @@ class Listener:
 
     def _listen(self) -> None:
         with self._stream:
-            whole = b""
-            while part := self._stream.readline(RAW):
-                if len(whole) < 2 * RAW:
-                    whole += part
-                if part.endswith(b"\n"):
-                    self._hear(whole)
-                    whole = b""
-            self._hear(whole)
+            line = b""
+            while part := os.read(self._stream.fileno(), CHUNK):
+                *lines, line = (line + part).split(b"\n")
+                for one in lines[-1:] if self._log.full else lines:
+                    self._hear(one)
+                if len(line) > 2 * CHUNK:
+                    line = line[:CHUNK] + line[-CHUNK:]
+            self._hear(line)
 
     def _hear(self, line: bytes) -> None:
-        self.last = self._log.heard(line) or self.last
+        kind = ""
+        if line.startswith(MARK):
+            kind, line = STATUS[min(line[1] - ord("0"), len(STATUS) - 1)], line[2:]
+        if text := one_line(line):
+            self.last = text
+            self._log.heard(f"logs {kind}: {text}" if kind else f"prints: {text}")

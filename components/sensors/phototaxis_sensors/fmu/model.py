@@ -77,13 +77,13 @@ class Stepped:
         step = Step(1 if fresh else tick - self._tick, inputs)
         self._steps.append(step)
         self._episode, self._tick = episode, tick
-        began = time.monotonic()
         try:
             if fresh:
                 self._host.begin(inputs)
+            began = time.monotonic()
             outputs = self._checked(self._host.step(inputs, step.periods))
-            if time.monotonic() - began > self._in_time:
-                self._slow(time.monotonic() - began)
+            if (seconds := time.monotonic() - began) > self._in_time * step.periods:
+                self._slow(seconds / step.periods)
         except Failed as why:
             outputs = self._again(why)
         if outputs is None or self._plain:

@@ -77,4 +77,4 @@ class Beams:
 
 
 def _clip(value: float, most: float) -> float:
-    return min(max(value, 0.0), most)
+    return min(max(0.0, value), most)

@@ -13,7 +13,7 @@ from phototaxis_sensors.fmu.build import compiled
 from phototaxis_sensors.fmu.crowd import Crew, FmuCrowd
 from phototaxis_sensors.fmu.description import Fmu, read, require_library
 from phototaxis_sensors.fmu.host import Failed, Host, Team, Terms, stay_on_one_cpu
-from phototaxis_sensors.fmu.log import Log
+from phototaxis_sensors.fmu.log import SHOWN, SHOWN_ON_REQUEST, Log
 from phototaxis_sensors.fmu.model import FmuModel, Stepped
 from phototaxis_sensors.fmu.pace import pace
 from phototaxis_sensors.fmu.rigs import Beams, Filters, Lamps, Rig
@@ -45,7 +45,8 @@ class Wired(NamedTuple):
 class FmuSensors:
     """Makes the models of a suite: FMUs where the options name one, else the built-in ones.
 
-    With `one_cpu` the thread that uses them stays on one CPU, with the FMUs.
+    With `one_cpu` the thread that uses them stays on one CPU, with the FMUs; with `logging` the first that they log
+    is shown.
 
     Raises
     ------
@@ -55,8 +56,8 @@ class FmuSensors:
 
     remembers = True
 
-    def __init__(self, options: FmuOptions, one_cpu: bool = False):
-        self._options, self._one_cpu = options, one_cpu
+    def __init__(self, options: FmuOptions, one_cpu: bool = False, logging: bool = False):
+        self._options, self._one_cpu, self._logging = options, one_cpu, logging
         files = {"light": options.light_fmu, "sonar": options.sonar_fmu}
         fmus = {kind: read(file, options.allow_invalid) for kind, file in files.items() if file}
         names, parameters = assign(options.fmu_map, options.fmu_param, fmus)
@@ -117,7 +118,7 @@ class FmuSensors:
                 f"{wired.fmu.file}: a process can have it once, and {instances} instances are needed; "
                 f"at most {PROCESSES} processes are started (with evaluate: fewer --placements)"
             )
-        log = Log(wired.label, options.fmu_log)
+        log = Log(wired.label, options.fmu_log or self._logging, SHOWN_ON_REQUEST if options.fmu_log else SHOWN)
         found = pace(wired.fmu.description, period, options.fmu_step)
         if found.remark and not quiet:
             log.tell(found.remark)
