@@ -2,10 +2,13 @@
 
 import os
 import shutil
+import subprocess
+import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import fmpy
 import psutil
 import pytest
 from phototaxis_sensors.fmu.build import Version, build
@@ -83,3 +86,38 @@ def workers() -> list[int]:
         if "phototaxis_sensors.fmu.worker" in words and ours:
             left.append(process.pid)
     return left
+
+
+Replaced = dict[str, str]
+
+
+def altered(target: Path, name: str, version: Version, code: Replaced, description: Replaced | None = None) -> Path:
+    """An example with other texts in its C sources and its description, and a library of them."""
+    require_compiler()
+    build(KNOWN[name], version, target, sources_only=True)
+    left = {**code, **(description or {})}
+
+    def edit(member: str, data: bytes) -> tuple[str, bytes]:
+        text = data.decode()
+        for old, new in (description or {} if member == "modelDescription.xml" else code).items():
+            if old in text:
+                left.pop(old, None)
+                text = text.replace(old, new)
+        return member, text.encode()
+
+    plain = target.with_suffix(".plain")
+    shutil.copy(target, plain)
+    edited(plain, target, edit)
+    assert not left, f"not there: {left}"
+    with tempfile.TemporaryDirectory() as folder:
+        with zipfile.ZipFile(target) as archive:
+            archive.extractall(folder)
+        sources, library = Path(folder) / "sources", Path(folder) / f"{name}.so"
+        headers = Path(fmpy.__file__).parent / "c-code"
+        files = [sources / f"{name}.c", sources / f"fmi{version}.c"]
+        command = ["gcc", "-shared", "-fPIC", "-w", "-I", headers, "-I", sources, *files, "-o", library, "-lm"]
+        subprocess.run(command, check=True)
+        with zipfile.ZipFile(target, "a") as archive:
+            place = fmpy.platform if version == 2 else fmpy.platform_tuple
+            archive.write(library, f"binaries/{place}/{name}{fmpy.sharedLibraryExtension}")
+    return target

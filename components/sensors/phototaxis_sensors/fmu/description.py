@@ -120,8 +120,8 @@ def _well_packed(path: str, archive: zipfile.ZipFile) -> None:
 
 def _version(path: str, archive: zipfile.ZipFile) -> int:
     try:
-        with archive.open("modelDescription.xml") as xml:
-            said = etree.parse(xml, etree.XMLParser(resolve_entities=False)).getroot().get("fmiVersion") or "none"
+        root = etree.fromstring(archive.read("modelDescription.xml"), etree.XMLParser(resolve_entities=False))
+        said = root.get("fmiVersion") or "none"
     except etree.XMLSyntaxError as error:
         raise UserError(f"{path}: its modelDescription.xml is not XML: {error.msg}") from None
     if said != "2.0" and not said.startswith("3."):

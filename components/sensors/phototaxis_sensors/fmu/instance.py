@@ -31,7 +31,7 @@ class Parameter(msgspec.Struct):
 
     kind: str
     reference: int
-    values: list[float | bool | str]
+    values: list[int | float | bool | str]
     structural: bool = False
     """It may change the sizes of other variables: set in configuration mode."""
 

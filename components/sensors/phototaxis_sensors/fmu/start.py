@@ -55,7 +55,7 @@ def bounds(variable: ModelVariable) -> tuple[float, float]:
     return -math.inf if low is None else float(low), math.inf if high is None else float(high)
 
 
-def _value(said: str, variable: ModelVariable, text: str) -> float | bool | str:
+def _value(said: str, variable: ModelVariable, text: str) -> int | float | bool | str:
     kind = variable.type
     try:
         if kind == "Boolean":
