@@ -141,17 +141,32 @@ class Physics:
         UserError
             when 10,000 tries found none.
         """
+        return self.sample(rng, 1)[0][0]
+
+    def sample(self, rng: np.random.Generator, count: int) -> tuple[list[Pose], float]:
+        """At most `count` free poses as in `random_pose`, out of 10,000 tries; the share of the tries that were free.
+
+        Raises
+        ------
+        UserError
+            when there was none.
+        """
         width, height = self._arena.size
-        away = self._arena.placement.light_distance
-        for _ in range(_TRIES):
+        away, found = self._arena.placement.light_distance, list[Pose]()
+        for tried in range(1, _TRIES + 1):
             u, v, w = rng.random(3).tolist()
             pose = Pose(u * width, v * height, (2 * w - 1) * math.pi)
             distances = (math.dist(pose[:2], light.position) for light in self._arena.lights)
             if min(distances) >= away and self.free(pose):
-                return pose
+                found.append(pose)
+                if len(found) == count:
+                    return found, count / tried
+        if found:
+            return found, len(found) / _TRIES
         raise UserError(
             f"arena {self._arena.name}: the robot ({self._robot.length} × {self._robot.width} m) fits nowhere: no free "
-            f"place {away} m from the lights in {_TRIES} tries; make room, or lower placement.light_distance"
+            f"place {away} m from the lights in {_TRIES} tries; make room, or lower placement.light_distance or "
+            f"placement.clearance"
         )
 
     def drive(self, left: float, right: float) -> Motion:
