@@ -1,6 +1,7 @@
 """Nothing passes a wall, whatever the arena says: speeds, steps, thin walls, wedges, one robot or many."""
 
 import math
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -25,7 +26,7 @@ def inside(outline: Outline, x: float, y: float) -> bool:
     return found
 
 
-def walled(collision: str, thickness: float = 0.1, step: float = 0.5, period: float = 0.5, **robot: float) -> Arena:
+def walled(collision: Any, thickness: float = 0.1, step: float = 0.5, period: float = 0.5, **robot: Any) -> Arena:
     """Two halves of a room with a closed wall between them."""
     return Arena(
         "t", (10.0, 10.0), [Light((9.0, 5.0))], walls=[Wall((5.0, 0.0), (5.0, 10.0), thickness)],
@@ -33,7 +34,7 @@ def walled(collision: str, thickness: float = 0.1, step: float = 0.5, period: fl
     )  # fmt: skip
 
 
-def labyrinth(seed: int, collision: str) -> tuple[Arena, Outline]:
+def labyrinth(seed: int, collision: Any) -> tuple[Arena, Outline]:
     """A closed cell of any shape, with wedges, stubs and pebbles about, and a robot of any size and haste."""
     rng = np.random.default_rng(seed)
     thick = float(10 ** rng.uniform(-2, -0.5))
@@ -41,15 +42,14 @@ def labyrinth(seed: int, collision: str) -> tuple[Arena, Outline]:
     reach = rng.uniform(1.5, 4, 5)
     outline = [(5 + r * math.cos(a), 5 + r * math.sin(a)) for r, a in zip(reach, angles, strict=True)]
     walls = [Wall(a, b, thick) for a, b in zip(outline, outline[1:] + outline[:1], strict=True)]
-    for _ in range(3):
-        tip, one = rng.uniform(3, 7, 2), rng.normal(size=2)
-        for end in (tip + one, tip + one + rng.normal(size=2) * 0.2):
-            walls.append(Wall((*tip.tolist(),), (*end.tolist(),), thick))  # pyright: ignore[reportArgumentType]
-    discs = [Disc((*rng.uniform(2, 8, 2).tolist(),), 0.01) for _ in range(3)]  # pyright: ignore[reportArgumentType]
+    for _ in range(3):  # wedges
+        (x, y), (dx, dy), (ex, ey) = rng.uniform(3, 7, 2).tolist(), *rng.normal(size=(2, 2)).tolist()
+        walls += [Wall((x, y), (x + dx + aside * ex, y + dy + aside * ey), thick) for aside in (0, 0.2)]
+    discs = [Disc((x, y), 0.01) for x, y in rng.uniform(2, 8, (3, 2)).tolist()]
     haste, whirl = (10 ** rng.uniform(-0.5, 1.3, 2)).tolist()
     length, width = rng.uniform(0.15, 0.6, 2).tolist()
     period = float(rng.choice([0.1, 0.5, 1.0]))
-    motion = Motion(period, period / int(rng.choice([1, 2, 5])), collision, float(rng.choice([0, 0.5, 2])))  # pyright: ignore[reportArgumentType]
+    motion = Motion(period, period / int(rng.choice([1, 2, 5])), collision, float(rng.choice([0, 0.5, 2])))
     robot = Robot(length=length, width=width, speed=haste, turn=whirl)
     arena = Arena(
         "t", (10.0, 10.0), [Light((5.0, 5.0))], walls=walls, discs=discs, robot=robot, motion=motion,

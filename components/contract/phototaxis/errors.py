@@ -27,6 +27,7 @@ class ComponentFailed(UserError):
     exit_code = 4
 
 
+WARNING = "phototaxis: warning: "
 _said: set[str] = set()
 
 
@@ -34,7 +35,7 @@ def warn(line: str) -> None:
     """Print ``phototaxis: warning: LINE`` on stderr, once in a process: for what may be meant as it is."""
     if line not in _said:
         _said.add(line)
-        print(f"phototaxis: warning: {line}", file=sys.stderr, flush=True)
+        print(f"{WARNING}{line}", file=sys.stderr, flush=True)
 
 
 def one_line(main: Callable[[], int]) -> int:

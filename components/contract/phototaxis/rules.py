@@ -7,16 +7,14 @@ said here but by the simulation, which can place a robot and look.
 import math
 from collections.abc import Iterator
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from phototaxis.sight import SHORT, falloff, half_planes
-from phototaxis.strides import deepest, fastest, narrowest, strides, thinnest
+from phototaxis.arena import Arena, Point, Polygon
+from phototaxis.sight import SHORT, falloff
+from phototaxis.solids import distance, extent, solids, thickness
+from phototaxis.strides import deepest, fastest, strides, thinnest
 from phototaxis.task import REACHED
-
-if TYPE_CHECKING:
-    from phototaxis.arena import Arena, Point, Polygon
 
 THINNEST = 0.002
 """What an obstacle must measure, m: twice the depth at which the solver leaves a contact."""
@@ -28,45 +26,39 @@ _CELLS = 4096
 """Cells of the search for a bright place, at a time."""
 
 
-def problem(arena: "Arena") -> str:
+def problem(arena: Arena) -> str:
     """The first rule that an arena breaks, in one line: `KEY: expected …`; "" when it breaks none."""
     rules = _name, _obstacles, _robot, _motion, _sensors, _lights, _brightness
     return next(chain.from_iterable(rule(arena) for rule in rules), "")
 
 
-def _name(arena: "Arena") -> Iterator[str]:
+def _name(arena: Arena) -> Iterator[str]:
     if not arena.name.isprintable() or not arena.name.strip():
         yield f"name: expected printable characters, got {arena.name!r}"
 
 
-def _obstacles(arena: "Arena") -> Iterator[str]:
+def _obstacles(arena: Arena) -> Iterator[str]:
     for index, wall in enumerate(arena.walls):
-        if wall.start == wall.end:
-            yield f"walls[{index}]: expected two different points, start and end are both {list(wall.start)}"
+        if math.dist(wall.start, wall.end) < THINNEST / 2:
+            where = f"start is {list(wall.start)}, end {list(wall.end)}"
+            yield f"walls[{index}]: expected two different points, {THINNEST / 2} m apart or more; {where}"
     for index, polygon in enumerate(arena.polygons):
         if not _convex(polygon):
             yield f"polygons[{index}].corners: expected a convex polygon without corners on a line, each corner once"
-        elif (width := narrowest(polygon)) < THINNEST:
-            yield f"polygons[{index}].corners: expected at least {THINNEST} m from side to side, got {width:.2g}"
-    for index, wall in enumerate(arena.walls):
-        if wall.thickness < THINNEST:
-            yield f"walls[{index}].thickness: expected at least {THINNEST} m, got {wall.thickness}"
-    for index, disc in enumerate(arena.discs):
-        if 2 * disc.radius < THINNEST:
-            yield f"discs[{index}].radius: expected at least {THINNEST / 2} m, got {disc.radius}"
+    for key, solid in solids(arena):
+        if (thick := thickness(solid)) < THINNEST:
+            yield f"{key}: expected an obstacle at least {THINNEST} m thick, got {thick:.3g} m"
 
 
-def _convex(polygon: "Polygon") -> bool:
+def _convex(polygon: Polygon) -> bool:
     """Whether all corners turn the same way, and once around in all (a star turns twice)."""
     corners = polygon.corners
     sides = [(bx - ax, by - ay) for (ax, ay), (bx, by) in pairwise([*corners, corners[0]])]
-    turns = [
-        math.atan2(ax * by - ay * bx, ax * bx + ay * by) for (ax, ay), (bx, by) in pairwise([*sides, sides[0]])
-    ]
+    turns = [math.atan2(ax * by - ay * bx, ax * bx + ay * by) for (ax, ay), (bx, by) in pairwise([*sides, sides[0]])]
     return len({math.copysign(1, turn) for turn in turns}) == 1 and 0 not in turns and abs(sum(turns)) < 3 * math.pi
 
 
-def _robot(arena: "Arena") -> Iterator[str]:
+def _robot(arena: Arena) -> Iterator[str]:
     robot = arena.robot
     for key, side in (("length", robot.length), ("width", robot.width)):
         if side < SMALLEST:
@@ -79,7 +71,7 @@ def _robot(arena: "Arena") -> Iterator[str]:
         yield f"placement.clearance: with {clear / 2} m around it the robot fits nowhere in a room of {_room(arena)}"
 
 
-def _fits(box: "Point", room: "Point") -> bool:
+def _fits(box: Point, room: Point) -> bool:
     """Whether a rectangle fits into another at some angle (J. Wetzel, Mathematics Magazine 73, 2000)."""
     p, q = max(box), min(box)
     a, b = max(room), min(room)
@@ -89,11 +81,11 @@ def _fits(box: "Point", room: "Point") -> bool:
     return q <= b and b * diagonal >= 2 * p * q * a + (p * p - q * q) * math.sqrt(diagonal - a * a)
 
 
-def _room(arena: "Arena") -> str:
+def _room(arena: Arena) -> str:
     return f"{arena.size[0]} × {arena.size[1]} m"
 
 
-def _motion(arena: "Arena") -> Iterator[str]:
+def _motion(arena: Arena) -> Iterator[str]:
     motion, robot = arena.motion, arena.robot
     period, step = motion.control_period, motion.physics_step
     if period > MOST_STRIDES * step:
@@ -108,7 +100,7 @@ def _motion(arena: "Arena") -> Iterator[str]:
         yield f"robot.{key}: expected at most {most:.3g} with a control period of {period} s {why}"
 
 
-def _sensors(arena: "Arena") -> Iterator[str]:
+def _sensors(arena: Arena) -> Iterator[str]:
     robot, room = arena.robot, math.hypot(*arena.size)
     places = [(f"robot.light_sensors[{index}]", place) for index, place in enumerate(robot.light_sensors)]
     places += [(f"robot.sonars[{index}].position", sonar.position) for index, sonar in enumerate(robot.sonars)]
@@ -122,54 +114,36 @@ def _sensors(arena: "Arena") -> Iterator[str]:
         )
 
 
-def _lights(arena: "Arena") -> Iterator[str]:
+def _lights(arena: Arena) -> Iterator[str]:
     width, height = arena.size
     away = arena.placement.light_distance
-    inside = list(_solids(arena))
+    named = list(solids(arena))
+    x0, y0, x1, y1 = np.array([extent(solid) for _, solid in named]).reshape(-1, 4).T
     for index, light in enumerate(arena.lights):
         x, y = light.position
         key = f"lights[{index}].position"
         if not (0 <= x <= width and 0 <= y <= height):
             yield f"{key}: expected a place inside the room, 0..{width} × 0..{height}"
-        for where, depth in inside:
-            if depth(x, y) > SHORT - 1e-9:
+        for at in np.flatnonzero((x0 < x) & (x < x1) & (y0 < y) & (y < y1)).tolist():
+            where, solid = named[at]
+            if distance(solid, np.array(x), np.array(y)) < 1e-9 - SHORT:
                 yield f"{key}: {list(light.position)} is inside {where}, where no sensor can see it"
         if (most := math.hypot(max(x, width - x), max(y, height - y))) < away:
             yield f"placement.light_distance: no place in the room is {away} m from lights[{index}]; at most {most:.3g}"
 
 
-def _solids(arena: "Arena"):
-    """The key of each obstacle, and how deep in it a point is, m; negative outside."""
-    for index, disc in enumerate(arena.discs):
-        yield f"discs[{index}]", lambda x, y, disc=disc: disc.radius - math.dist((x, y), disc.centre)
-    for index, polygon in enumerate(arena.polygons):
-        planes = half_planes(np.array(polygon.corners))
-        yield f"polygons[{index}]", lambda x, y, planes=planes: min(
-            (offset - nx * x - ny * y) / math.hypot(nx, ny) for nx, ny, offset in planes
-        )
-    for index, wall in enumerate(arena.walls):
-        yield f"walls[{index}]", lambda x, y, wall=wall: wall.thickness / 2 - _from_line((x, y), wall.start, wall.end)
-
-
-def _from_line(point: "Point", start: "Point", end: "Point") -> float:
-    """The distance of a point from a straight line between two others, m."""
-    (x, y), (ax, ay), (bx, by) = point, start, end
-    dx, dy = bx - ax, by - ay
-    along = max(0.0, min(1.0, ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)))
-    return math.hypot(x - ax - along * dx, y - ay - along * dy)
-
-
-def _brightness(arena: "Arena") -> Iterator[str]:
+def _brightness(arena: Arena) -> Iterator[str]:
     noise = arena.sensing.noise
     brightest = (1 + noise) * _brightest(arena, REACHED / (1 + noise))
     if brightest <= REACHED:
+        index = max(range(len(arena.lights)), key=lambda index: arena.lights[index].brightness)
         yield (
-            f"lights[{max(range(len(arena.lights)), key=lambda index: arena.lights[index].brightness)}].brightness: "
-            f"no sensor can ever read more than {brightest:.3g}, and the light counts as reached above {REACHED}"
+            f"lights[{index}].brightness: no sensor can ever read more than {brightest:.3g}, "
+            f"and the light counts as reached above {REACHED}"
         )
 
 
-def _brightest(arena: "Arena", enough: float) -> float:
+def _brightest(arena: Arena, enough: float) -> float:
     """An upper bound of the sum of all lights anywhere, as tight as it needs to be compared with `enough`.
 
     Cells that are too dark even if each light stood at its nearest point are dropped, the others quartered.

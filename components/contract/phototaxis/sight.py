@@ -4,18 +4,16 @@ The built-in sensors of many robots use it, and the check whether an arena can b
 """
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from phototaxis.arena import Arena, Light, Sensing
+from phototaxis.arena import Arena, Light, Sensing
 
 SHORT = 0.1
 """The line of sight stops this far from the light, m, so that a lamp may stand in a socket."""
 
 
-def falloff(law: "Sensing", distance: np.ndarray) -> np.ndarray:
+def falloff(law: Sensing, distance: np.ndarray) -> np.ndarray:
     """What a light of brightness 1 gives at a distance in m."""
     if law.light_law == "linear":
         return np.maximum(1 - distance / law.light_range, 0.0)
@@ -25,7 +23,7 @@ def falloff(law: "Sensing", distance: np.ndarray) -> np.ndarray:
 class LightSensors:
     """The two light sensors of each robot in an arena, without noise."""
 
-    def __init__(self, arena: "Arena", obstacles: "Obstacles"):
+    def __init__(self, arena: Arena, obstacles: "Obstacles"):
         self._arena, self._walls = arena, obstacles
 
     def __call__(self, poses: np.ndarray) -> np.ndarray:
@@ -36,7 +34,7 @@ class LightSensors:
             total += np.where(visible, light.brightness * falloff(self._arena.sensing, distance), 0.0)
         return np.minimum(total, 1.0)
 
-    def sight(self, light: "Light", poses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def sight(self, light: Light, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """One light as each robot's two sensors see it, (2, N) each.
 
         Its place relative to the sensor (east and north, m), its distance, and whether neither a wall nor the
@@ -55,7 +53,7 @@ class LightSensors:
             dark |= self._through_body(light, poses)
         return *to_light, distance, ~dark
 
-    def _through_body(self, light: "Light", poses: np.ndarray) -> np.ndarray:
+    def _through_body(self, light: Light, poses: np.ndarray) -> np.ndarray:
         """Whether the line from light to sensor crosses the inside of the body's rectangle (slab method)."""
         x, y, heading = poses.T
         cos, sin = np.cos(heading), np.sin(heading)
@@ -86,7 +84,7 @@ def slab(start: np.ndarray, step: np.ndarray, low: float, high: float) -> tuple[
 class Obstacles:
     """What a ray can hit, as convex outlines and discs; a ray that starts inside one hits it at once."""
 
-    def __init__(self, arena: "Arena"):
+    def __init__(self, arena: Arena):
         self._size = arena.size
         outlines = [np.array(polygon.corners) for polygon in arena.polygons]
         self._discs = [(*disc.centre, disc.radius) for disc in arena.discs]

@@ -1,8 +1,6 @@
 """Reading arenas: by the name of a shipped one, or from a TOML file."""
 
 import re
-from collections.abc import Sequence
-from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -11,8 +9,12 @@ import msgspec
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError, warn
 
+from phototaxis_sim.survey import survey
+
 _FOLDER = resources.files("phototaxis_sim") / "arenas"
 _LIMIT = 16_000_000
+_surveyed: dict[str, list[str]] = {}
+"""What `survey` said, by the arena's digest."""
 
 
 def shipped() -> list[str]:
@@ -52,37 +54,30 @@ def enter(name: str) -> Arena:
         as in `load`, and when the robot can be placed nowhere, or only where the light is reached already.
     """
     arena = load(name)
-    for suspicion in suspicions(name):
-        warn(f"{name}: {suspicion}")
-    return arena
-
-
-@cache
-def suspicions(name: str) -> Sequence[str]:
-    """What may be wrong with an arena, a line each; nothing with a shipped one. Errors as in `enter`."""
-    if name in shipped():
-        return ()
-    from phototaxis_sim.survey import survey
-
-    arena = load(name)
+    if name in shipped():  # there is nothing suspicious about them: a test says so
+        return arena
+    if arena.name in shipped() and arena.digest != load(arena.name).digest:
+        warn(f"{name}: name: '{arena.name}' is the name of a shipped arena, and this is another world")
     try:
-        found = survey(arena)
+        if arena.digest not in _surveyed:
+            _surveyed[arena.digest] = survey(arena)
     except UserError as error:
         raise UserError(f"{name}: {error}") from None
-    if arena.name in shipped() and arena.digest != load(arena.name).digest:
-        found.insert(0, f"name: '{arena.name}' is the name of a shipped arena, and this is another world")
-    return found
+    for suspicion in _surveyed[arena.digest]:
+        warn(f"{name}: {suspicion}")
+    return arena
 
 
 def parse(text: str, source: str) -> Arena:
     """The arena in a TOML text; `source` names it in errors."""
     try:
         raw = msgspec.toml.decode(text)
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise UserError(f"{source}: not TOML: {error}") from None
+    try:
         return msgspec.convert(raw, Arena)
     except msgspec.ValidationError as error:
         raise UserError(f"{source}: {_explain(str(error), raw)}") from None
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise UserError(f"{source}: not TOML: {error}") from None
 
 
 _PLAIN = {

@@ -139,7 +139,7 @@ class Crowd:
         there = np.arange(2) < ids[:, 2:]
         points = floats[:, 2:].reshape(-1, 2, 3)  # x, y, distance
         np.maximum.at(self._depth, row, np.where(there, np.maximum(-points[:, :, 2], 0.0), -1.0).max(axis=1))
-        there &= floats[:, :2].any(axis=1)[:, None]  # beside a wall, or leaving it: nothing presses
+        there &= (np.abs(floats[:, :2]).max(axis=1) > 0)[:, None]  # beside a wall, or leaving it: nothing presses
         x, y, heading = poses[row].T[:, :, None]
         ahead = (points[:, :, 0] - x) * np.cos(heading) + (points[:, :, 1] - y) * np.sin(heading) >= 0
         np.logical_or.at(self.front, row, (ahead & there).any(axis=1))
