@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
+from phototaxis.arena import Arena
 from phototaxis.checkpoint import Meta, learner_hash
 from phototaxis.errors import UserError
 from phototaxis.messages import Command, End, Readings
@@ -37,6 +38,7 @@ class Agent:
     task, exploration : what is learned and how actions are drawn.
     near : obstacle threshold of the arena, m.
     seed : of all the agent's randomness.
+    arena : where it learns, which its checkpoints tell.
     budget : learning steps that falling rates and temperatures are spread over.
     learning : False freezes the policy (the temperature is then the final one).
 
@@ -56,10 +58,11 @@ class Agent:
         seed: int,
         budget: int,
         learning: bool = True,
-        arena: str = "",
+        arena: Arena | None = None,
     ):
         kind: type[Learner] = find(learner)
-        self.name, self.author, self.arena = learner, learner, arena
+        self.name, self.author = learner, learner
+        self.arena = self.arena_digest = ""
         self.task, self.exploration, self.budget = task, exploration, budget
         self.percept = PERCEPTS[task.percept]
         self.learning = learning
@@ -71,6 +74,8 @@ class Agent:
         self.learner: Learner = kind(self._options, self.percept, self._rng)
         self._reward = task.scheme()
         self._near = near
+        if arena is not None:
+            self.enter(arena)
         self._memory = Memory()
         self._strides = _strides(self.percept.sizes)
         self.visits = [0] * math.prod(self.percept.sizes)
@@ -79,6 +84,10 @@ class Agent:
         self._linked = False
         self.command: Command | None = None
         """The answer to the last tick."""
+
+    def enter(self, arena: Arena) -> None:
+        """Go on in an arena."""
+        self.arena, self.arena_digest, self._near = arena.name, arena.digest, arena.sensing.near
 
     def __call__(self, readings: Readings) -> Command:
         """Answer one tick: perceive, learn from the last action, choose the next."""
@@ -166,6 +175,7 @@ class Agent:
             random=_map_numbers(str, self._rng.bit_generator.state),
             visits=list(self.visits),
             arena=self.arena,
+            arena_digest=self.arena_digest,
             learner_hash=digest,
         )
         return meta, arrays

@@ -12,7 +12,7 @@ from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import decode, encode, load, save
 from phototaxis.chunks import Chunks
 from phototaxis.codec import Refused
-from phototaxis.errors import UserError
+from phototaxis.errors import UserError, warn
 from phototaxis.journal import Journal
 from phototaxis.messages import (
     AgentLog,
@@ -251,9 +251,13 @@ class Server:
             agent = self._make(world)
             agent.author = self._bus.ident
             if self._resume is not None and (self._required or self._resume.exists()):
-                agent.restore(*load(self._resume), source=str(self._resume))
+                meta, arrays = load(self._resume)
+                agent.restore(meta, arrays, str(self._resume))
+                if other := meta.elsewhere(world.arena):
+                    warn(f"{self._resume}: {other}")
         else:
             agent = self._session.agent
+            agent.enter(world.arena)
         self._session = Session(world, agent, _answering(world, agent))
         self._driving = self._seated = self._enlisted = self._related = self._in_step = False
         self._leader = self._predecessor = ""

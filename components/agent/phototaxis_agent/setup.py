@@ -45,7 +45,7 @@ class Setup(Struct):
             seed=world.seed if seed is None else seed,
             budget=budget or world.epochs or DEFAULT_BUDGET,
             learning=learning,
-            arena=world.arena.name,
+            arena=world.arena,
         )
 
 

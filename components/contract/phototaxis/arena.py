@@ -4,13 +4,18 @@ Lengths are metres, angles radians, times seconds; x points right, y up, heading
 The same structure is read from a TOML file by the simulation and travels inside the `World` message.
 """
 
+import hashlib
 from typing import Annotated, Literal
 
+import msgspec
 from msgspec import Meta, Struct, field
 
-Point = tuple[float, float]
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
+MOST = 10_000
+"""No length, time or rate is larger (NaN and infinity are not either)."""
+Coordinate = Annotated[float, Meta(ge=-MOST, le=MOST)]
+Point = tuple[Coordinate, Coordinate]
+Positive = Annotated[float, Meta(gt=0, le=MOST)]
+NotNegative = Annotated[float, Meta(ge=0, le=MOST)]
 
 
 class Wall(Struct, forbid_unknown_fields=True, frozen=True):
@@ -45,7 +50,7 @@ class Sonar(Struct, forbid_unknown_fields=True, frozen=True):
     """One sonar: where it sits on the robot and where it looks, in the robot's frame."""
 
     position: Point
-    angle: float
+    angle: Coordinate
 
 
 def pioneer_sonars() -> list[Sonar]:
@@ -112,7 +117,13 @@ class Placement(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Arena(Struct, forbid_unknown_fields=True, frozen=True):
-    """A world as its TOML file describes it."""
+    """A world as its TOML file describes it.
+
+    Raises
+    ------
+    ValueError
+        when it breaks a rule (`phototaxis.rules`); a decoder makes a ValidationError of it.
+    """
 
     name: Annotated[str, Meta(min_length=1, max_length=64)]
     size: tuple[Positive, Positive]
@@ -127,6 +138,12 @@ class Arena(Struct, forbid_unknown_fields=True, frozen=True):
     motion: Motion = Motion()
     placement: Placement = Placement()
 
+    def __post_init__(self) -> None:
+        from phototaxis.rules import problem  # needs NumPy, which messages do without
+
+        if found := problem(self):
+            raise ValueError(found)
+
     def boundary(self) -> list[Polygon]:
         """The four enclosing walls, 1 m thick, outside the room: its inside is exactly `size`."""
         width, height = self.size
@@ -137,6 +154,12 @@ class Arena(Struct, forbid_unknown_fields=True, frozen=True):
             (width, 0, width + 1, height),
         )
         return [Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]) for x0, y0, x1, y1 in boxes]
+
+    @property
+    def digest(self) -> str:
+        """What the world is, 16 hexadecimal digits: equal in arenas that differ in `name` and `about` alone."""
+        world = {key: value for key, value in msgspec.structs.asdict(self).items() if key not in ("name", "about")}
+        return hashlib.blake2b(msgspec.json.encode(world), digest_size=8).hexdigest()
 
     @property
     def physics_steps(self) -> int:

@@ -15,10 +15,13 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
+from phototaxis.arena import Arena
 from phototaxis.errors import UserError
 from phototaxis.messages import End, Motor
 
-FORMAT = 1
+FORMAT = 2
+OLDEST = 1
+"""The oldest format that is read; it lacks `arena_digest`."""
 _LIMIT = 1_000_000_000
 
 
@@ -53,7 +56,23 @@ class Meta(Struct, forbid_unknown_fields=True, kw_only=True):
     visits: list[int]
     """How often each percept was met."""
     arena: str
+    """Name of the arena in which it learned last."""
+    arena_digest: str = ""
+    """`Arena.digest` of that arena; "" where it is not known."""
     learner_hash: str
+
+    def elsewhere(self, arena: Arena) -> str:
+        """A sentence about where it learned, if that is not known to be this arena; else ""."""
+        if self.arena_digest == arena.digest:
+            return ""
+        if not self.arena_digest:
+            return f"learned in an arena called '{self.arena}'; whether it is this one, the file is too old to say"
+        there, here = f"'{self.arena}' ({self.arena_digest})", f"'{arena.name}' ({arena.digest})"
+        return f"learned in the arena {there}, which is another world than {here}"
+
+
+class _Header(Struct):
+    format: int
 
 
 def learner_hash(arrays: dict[str, np.ndarray]) -> str:
@@ -88,13 +107,15 @@ def decode(data: bytes, source: str) -> tuple[Meta, dict[str, np.ndarray]]:
                 raise UserError(f"{source}: unpacks to more than {_LIMIT} bytes, not loaded")
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
-        meta = msgspec.json.decode(arrays.pop("meta").tobytes(), type=Meta)
+        text = arrays.pop("meta").tobytes()
+        written = msgspec.json.decode(text, type=_Header).format
+        if not OLDEST <= written <= FORMAT:
+            raise UserError(f"{source}: checkpoint format {written}, this version reads {OLDEST} to {FORMAT}")
+        meta = msgspec.json.decode(text, type=Meta)
     except (zipfile.BadZipFile, EOFError, zlib.error) as error:
         raise UserError(f"{source}: not a checkpoint, or truncated: {error}") from None
     except (KeyError, ValueError, OSError, msgspec.MsgspecError) as error:
         raise UserError(f"{source}: not a Phototaxis checkpoint: {error}") from None
-    if meta.format != FORMAT:
-        raise UserError(f"{source}: checkpoint format {meta.format}, this version reads {FORMAT}")
     if learner_hash(arrays) != meta.learner_hash:
         raise UserError(f"{source}: the contents do not match their hash; the file is damaged")
     return meta, arrays

@@ -12,6 +12,8 @@ class Summary(msgspec.Struct):
 
     run: str
     arena: str
+    arena_digest: str = ""
+    """`Arena.digest`: two worlds may have one name."""
     drivers: list[str] = []
     """Who drove, in the order of their first tick."""
     tick: int = -1

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from phototaxis.arena import Arena
 from phototaxis.checkpoint import Meta
 from phototaxis.errors import UserError
 from phototaxis.messages import Command, End, Readings, World
@@ -67,7 +68,8 @@ class PolicyAgent:
 
     def __init__(self, model: Any, file: Path, world: World, cap: int):
         self.name = self.author = f"policy-{file.stem}"
-        self.arena, near = world.arena.name, world.arena
+        near = world.arena
+        self.enter(near)
         self._model = model
         percept = next((name for name in PERCEPTS if observation(name, near).space == model.observation_space), "")
         discrete = model.action_space == spaces.Discrete(len(ACTIONS))
@@ -82,6 +84,10 @@ class PolicyAgent:
         self.command: Command | None = None
         self.visits: list[int] = []
         self.last = (0, -1, 0.0, 0.0, 0.0)
+
+    def enter(self, arena: Arena) -> None:
+        """Go on in an arena."""
+        self.arena, self.arena_digest = arena.name, arena.digest
 
     def __call__(self, readings: Readings) -> Command:
         """Answer one tick."""
@@ -123,7 +129,7 @@ class PolicyAgent:
             exploration={}, budget=0, run=self._run, tick=self._tick, episode=self._episode, epoch=0, steps=self._steps,
             lights=list(self._memory.lights), state=(), linked=False,
             answer=None if command is None else (command.left, command.right, command.end),
-            random={}, visits=[], arena=self.arena, learner_hash="",
+            random={}, visits=[], arena=self.arena, arena_digest=self.arena_digest, learner_hash="",
         )  # fmt: skip
         return meta, {}
 

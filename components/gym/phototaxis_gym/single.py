@@ -66,7 +66,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         self._reward, self.action_space = rewards(reward, valid_percept(percept)), actions(action)
         self._cap, self.render_mode = valid_cap(cap), render_mode
         try:
-            self._place: Place = There(connect, world, timeout) if connect else Here(arenas.load(arena or "paper"))
+            self._place: Place = There(connect, world, timeout) if connect else Here(arenas.enter(arena or "paper"))
         except UserError as error:
             raise Error(str(error)) from None
         self._arena = self._place.arena

@@ -57,7 +57,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         self._reward, self.single_action_space = rewards(reward, valid_percept(percept)), actions(action)
         try:
             self._place: Places = (
-                ManyThere(connect, world, timeout, num_envs) if connect else ManyHere(arenas.load(arena or "paper"))
+                ManyThere(connect, world, timeout, num_envs) if connect else ManyHere(arenas.enter(arena or "paper"))
             )
         except UserError as error:
             raise Error(str(error)) from None

@@ -45,7 +45,7 @@ class System(Struct, frozen=True):
 
     def check(self) -> None:
         """UserError when there is no such arena, learner or option, or when they do not go together."""
-        self.setup().agent(World("check", arenas.load(self.arena), 0, 1))
+        self.setup().agent(World("check", arenas.enter(self.arena), 0, 1))
 
     def __str__(self) -> str:
         words = [self.learner, self.percept, *([self.reward] if self.reward != "preset" else [])]

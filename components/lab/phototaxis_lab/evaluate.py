@@ -6,8 +6,10 @@ from typing import Annotated
 
 import msgspec
 from msgspec import Meta, Struct
+from phototaxis.arena import Arena
+from phototaxis.checkpoint import Meta as Checkpoint
 from phototaxis.checkpoint import load
-from phototaxis.errors import UserError
+from phototaxis.errors import UserError, warn
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Seed, World
 from phototaxis.options import parse_groups
@@ -36,19 +38,43 @@ def main(argv: Sequence[str]) -> int:
     options, fmus = parse_groups(groups, argv, "phototaxis evaluate", about, positional=["checkpoint"])
     from phototaxis_agent.setup import from_checkpoint
     from phototaxis_sensors.choice import choose
-    from phototaxis_sim import arenas
 
     from phototaxis_lab.measure import SEED_OFFSET, describe, evaluate
 
     path = Path(options.checkpoint)
     meta, arrays = load(path)
-    if not options.arena and meta.arena not in arenas.shipped():
-        raise UserError(f"{path}: learned in the arena '{meta.arena}', which is not shipped; give its file: --arena")
-    arena = arenas.load(options.arena or meta.arena)
+    arena = where(path, meta, options.arena)
     setup = from_checkpoint(meta, str(path))
     agent = setup.agent(World("evaluation", arena, options.seed + SEED_OFFSET, 0), learning=False)
     agent.take_over(meta, arrays, str(path))
     with choose(fmus) as sensors:
         found = evaluate(arena, agent, options.placements, options.seed, options.cap, sensors)
-    print(msgspec.json.encode(found).decode() if options.json else describe(found))
+    place = {
+        "arena": options.arena or arena.name,
+        "arena_digest": arena.digest,
+        "learned_in": meta.arena,
+        "learned_in_digest": meta.arena_digest,
+    }
+    told = msgspec.json.encode(msgspec.to_builtins(found) | place).decode()
+    print(told if options.json else f"{describe(found)}; measured in the arena '{place['arena']}'")
     return 0
+
+
+def where(path: Path, meta: Checkpoint, given: str) -> Arena:
+    """The arena to measure in: the one that is given, else that of the training, if it is a shipped one.
+
+    Raises
+    ------
+    UserError
+        when the arena of the training is not to be had.
+    """
+    from phototaxis_sim import arenas
+
+    if not given and meta.arena not in arenas.shipped():
+        raise UserError(f"{path}: learned in the arena '{meta.arena}', which is not shipped; give its file: --arena")
+    arena = arenas.enter(given or meta.arena)
+    if other := meta.elsewhere(arena):
+        if not given and meta.arena_digest:
+            raise UserError(f"{path}: {other}; give the file of the one, or the name of the other: --arena")
+        warn(f"{path}: {other}")
+    return arena

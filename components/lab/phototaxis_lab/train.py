@@ -45,7 +45,7 @@ def main(argv: Sequence[str]) -> int:
     from phototaxis_sensors.choice import choose
     from phototaxis_sim import arenas
 
-    arena = arenas.load(options.arena)
+    arena = arenas.enter(options.arena)
     if options.seeds:
         found = many(options, setup)
     else:

@@ -23,6 +23,7 @@ def main(argv: Sequence[str]) -> int:
         return 0
     placements = 200
     evaluate = [sys.executable, "-m", "phototaxis_launcher", "evaluate", str(run.checkpoint), "--json", *flags(fmus)]
+    evaluate.append(f"--arena={options.arena}")
     done = subprocess.run([*evaluate, f"--placements={placements}"], capture_output=True, text=True, check=False)
     if done.returncode:
         raise ComponentFailed(f"the evaluation failed: {done.stderr.strip()}")

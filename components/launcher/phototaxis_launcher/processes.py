@@ -7,7 +7,7 @@ from collections import deque
 from pathlib import Path
 
 from phototaxis.component import made_up
-from phototaxis.errors import ComponentFailed, Unavailable, UserError
+from phototaxis.errors import WARNING, ComponentFailed, Unavailable, UserError
 
 RESTARTS = 3
 WITHIN = 20.0
@@ -40,7 +40,7 @@ class Child:
     ):
         self.name, self.label, self._may_leave = name, label, may_leave
         self._module, self._arguments = module, arguments
-        self._log = folder / f"{name}.log"
+        self._log, self._read = folder / f"{name}.log", 0
         self.idents: list[str] = []
         self.left = False
         self._deaths: deque[float] = deque(maxlen=RESTARTS + 1)
@@ -107,6 +107,19 @@ class Child:
                 self.process.wait()
         if self.process.stdin is not None:
             self.process.stdin.close()
+
+    def warnings(self) -> list[str]:
+        """The warnings (`phototaxis.errors.warn`) that it wrote since this was asked last."""
+        try:
+            with self._log.open("rb") as log:
+                log.seek(self._read)
+                written = log.read()
+        except FileNotFoundError:
+            return []
+        whole = written[: written.rfind(b"\n") + 1]
+        self._read += len(whole)
+        lines = whole.decode(errors="replace").splitlines()
+        return [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
 
     def tail(self, lines: int) -> str:
         """The last lines it wrote."""

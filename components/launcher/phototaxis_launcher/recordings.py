@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -77,11 +78,14 @@ def as_object(recording: Recording) -> dict[str, object]:
 def table(found: list[Recording]) -> list[str]:
     """The recordings as aligned lines."""
     rows: list[tuple[str, ...]] = [("recording", "run", "arena", "drivers", "epochs", "success", "MB")]
+    worlds = {(one.summary.arena, one.summary.arena_digest) for one in found if one.summary is not None}
+    names = Counter(name for name, _ in worlds)
     for file, size, _, summary in found:
         known = ("?",) * 5
         if summary is not None:
             success = f"{summary.reached} of {summary.episodes}, last 50: {summary.recent:.0%}"
-            known = (summary.run, summary.arena, ", ".join(summary.drivers), str(summary.epochs), success)
+            arena = summary.arena if names[summary.arena] == 1 else f"{summary.arena} ({summary.arena_digest[:4]})"
+            known = (summary.run, arena, ", ".join(summary.drivers), str(summary.epochs), success)
         rows.append((str(file), *known, f"{size / MEGABYTE:.1f}"))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -12,7 +12,7 @@ from typing import Annotated
 from msgspec import Meta
 from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
-from phototaxis.errors import ComponentFailed, UserError
+from phototaxis.errors import ComponentFailed, UserError, warn
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import MOST, Count, Launch, LaunchReply, Seed, Status, run_name
 from phototaxis.options import Parser, add_options, convert, flags, peek
@@ -165,6 +165,8 @@ class Run:
 
     def _watch(self, progress: Progress) -> None:
         for child in self._all():
+            for line in child.warnings():
+                warn(line)
             try:
                 if child.watch():
                     progress.say(f"{child.name} ended and was restarted; see {self.folder}")

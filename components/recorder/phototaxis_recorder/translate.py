@@ -43,7 +43,7 @@ class Translator:
         self._driver = ""
         self._models = {"sonar": "", "light": ""}
         self._rewards: deque[float] = deque(maxlen=MEAN)
-        self.summary = Summary(world.run, world.arena.name)
+        self.summary = Summary(world.run, world.arena.name, world.arena.digest)
         draw_world(recording, world.arena)
 
     def sim(self, chunk: SimLog) -> None:

@@ -4,12 +4,10 @@ import math
 from typing import NamedTuple
 
 from phototaxis.arena import Arena, Light
+from phototaxis.sight import SHORT
 
 from phototaxis_sensors.model import BuiltIn, Moment
 from phototaxis_sensors.scene import Scene
-
-SHORT = 0.1
-"""The line of sight stops this far from the light, m, so that a lamp may stand in a socket."""
 
 
 class Sight(NamedTuple):

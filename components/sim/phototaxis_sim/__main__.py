@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from phototaxis_sim.server import Server
     from phototaxis_sim.simulation import Simulation
 
-    arena = arenas.load(options.arena)
+    arena = arenas.enter(options.arena)
     setting = arena, options.seed, options.run or run_name(), options.epochs
     simulation = SimulationOfMany(*setting, options.robots) if options.robots > 1 else Simulation(*setting)
     if options.robots > 1 and options.restarted:

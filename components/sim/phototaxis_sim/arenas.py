@@ -3,13 +3,18 @@
 import re
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import msgspec
 from phototaxis.arena import Arena
-from phototaxis.errors import UserError
+from phototaxis.errors import UserError, warn
+
+from phototaxis_sim.survey import survey
 
 _FOLDER = resources.files("phototaxis_sim") / "arenas"
 _LIMIT = 16_000_000
+_surveyed: dict[str, list[str]] = {}
+"""What `survey` said, by the arena's digest."""
 
 
 def shipped() -> list[str]:
@@ -28,31 +33,60 @@ def load(name: str) -> Arena:
     if name in shipped():
         return parse((_FOLDER / f"{name}.toml").read_text("utf-8"), name)
     path = Path(name)
-    if not path.is_file():
-        raise UserError(f"no arena '{name}': neither a file nor one of {', '.join(shipped())}")
-    if path.stat().st_size > _LIMIT:
-        raise UserError(f"{name}: larger than {_LIMIT} bytes, not an arena")
     try:
-        return parse(path.read_text("utf-8"), name)
+        if not path.is_file():
+            raise UserError(f"no arena '{name}': neither a file nor one of {', '.join(shipped())}")
+        if path.stat().st_size > _LIMIT:
+            raise UserError(f"{name}: larger than {_LIMIT} bytes, not an arena")
+        return parse(path.read_text("utf-8-sig"), name)
     except UnicodeDecodeError:
         raise UserError(f"{name}: not a text file in UTF-8") from None
+    except (OSError, ValueError) as error:
+        raise UserError(f"arena {name!r}: {getattr(error, 'strerror', None) or error}") from None
+
+
+def enter(name: str) -> Arena:
+    """As `load`, for a command that is about to use the arena: what is suspicious about it is a warning on stderr.
+
+    Raises
+    ------
+    UserError
+        as in `load`, and when the robot can be placed nowhere, or only where the light is reached already.
+    """
+    arena = load(name)
+    if name in shipped():  # there is nothing suspicious about them: a test says so
+        return arena
+    if arena.name in shipped() and arena.digest != load(arena.name).digest:
+        warn(f"{name}: name: '{arena.name}' is the name of a shipped arena, and this is another world")
+    try:
+        if arena.digest not in _surveyed:
+            _surveyed[arena.digest] = survey(arena)
+    except UserError as error:
+        raise UserError(f"{name}: {error}") from None
+    for suspicion in _surveyed[arena.digest]:
+        warn(f"{name}: {suspicion}")
+    return arena
 
 
 def parse(text: str, source: str) -> Arena:
     """The arena in a TOML text; `source` names it in errors."""
     try:
-        arena = msgspec.toml.decode(text, type=Arena)
-    except msgspec.ValidationError as error:
-        raise UserError(f"{source}: {_explain(str(error))}") from None
-    except msgspec.DecodeError as error:
+        raw = msgspec.toml.decode(text)
+    except (msgspec.DecodeError, RecursionError) as error:
         raise UserError(f"{source}: not TOML: {error}") from None
-    problem = next(iter(_problems(arena)), None)
-    if problem:
-        raise UserError(f"{source}: {problem}")
-    return arena
+    try:
+        return msgspec.convert(raw, Arena)
+    except msgspec.ValidationError as error:
+        raise UserError(f"{source}: {_explain(str(error), raw)}") from None
 
 
-def _explain(text: str) -> str:
+_PLAIN = {
+    "`float`": "a number", "`int`": "a whole number", "`str`": "a text", "`array`": "a list", "`object`": "a table",
+    "`bool`": "true or false",
+}  # fmt: skip
+
+
+def _explain(text: str, raw: Any) -> str:
     """msgspec's words with the key in front: `robot.wheels: unknown key`."""
     what, _, where = text.partition(" - at `$")
     where = where.rstrip("`").lstrip(".").removeprefix("$.")
@@ -63,33 +97,20 @@ def _explain(text: str) -> str:
     missing = re.fullmatch(r"Object missing required field `(.*)`", what)
     if missing:
         return f"{'.'.join(filter(None, [where, missing[1]]))}: missing"
-    what = what.replace("Expected `array`", "expected a list").replace("Expected", "expected")
-    return f"{where}: {what}"
+    if not where:
+        return what
+    for word, plain in _PLAIN.items():
+        what = what.replace(word, plain)
+    value = _at(raw, where)
+    got = f", got {value!r}" if type(value) in (int, float) else ""
+    return f"{where}: {what[0].lower()}{what[1:]}{got}"
 
 
-def _problems(arena: Arena) -> list[str]:
-    """What is well-formed and yet no world; the first is told."""
-    found = []
-    for index, wall in enumerate(arena.walls):
-        if wall.start == wall.end:
-            found.append(f"walls[{index}]: expected two different points, start and end are both {list(wall.start)}")
-    for index, polygon in enumerate(arena.polygons):
-        turns = set()
-        corners = polygon.corners
-        for a, b, c in zip(corners, corners[1:] + corners[:1], corners[2:] + corners[:2], strict=True):
-            turns.add(_sign((b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])))
-        if turns not in ({1}, {-1}):
-            found.append(f"polygons[{index}].corners: expected a convex polygon without corners on a line")
-    width, height = arena.size
-    for index, light in enumerate(arena.lights):
-        x, y = light.position
-        if not (0 <= x <= width and 0 <= y <= height):
-            found.append(f"lights[{index}].position: expected a place inside the room, 0..{width} × 0..{height}")
-    period, step = arena.motion.control_period, arena.motion.physics_step
-    if arena.physics_steps < 1 or abs(arena.physics_steps * step - period) > 1e-9 * period:
-        found.append(f"motion.physics_step: expected a whole fraction of control_period = {period}, got {step}")
-    return found
-
-
-def _sign(value: float) -> int:
-    return (value > 0) - (value < 0)
+def _at(raw: Any, where: str) -> Any:
+    """The value at a path such as `walls[0].start[1]`; None where there is none."""
+    for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", where):
+        try:
+            raw = raw[key] if key else raw[int(index)]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return raw

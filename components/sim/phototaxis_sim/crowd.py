@@ -3,9 +3,10 @@
 import numpy as np
 import pymunk
 from phototaxis.arena import Arena
+from phototaxis.strides import deepest, furthest
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
-from phototaxis_sim.physics import Physics, Pose, add_robot, new_space
+from phototaxis_sim.physics import Physics, Pose, add_robot, new_space, spend, step_of, undo
 
 _EACH_OTHER = pymunk.ShapeFilter(group=1)
 _POSE = BodyFields.POSITION | BodyFields.ANGLE
@@ -13,7 +14,8 @@ _PUSH = BodyFields.FORCE | BodyFields.TORQUE
 _REST = BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 _TOUCH = (
     ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.CONTACT_COUNT
-    | ArbiterFields.TOTAL_IMPULSE | ArbiterFields.POINT_A_1 | ArbiterFields.POINT_A_2
+    | ArbiterFields.TOTAL_IMPULSE | ArbiterFields.POINT_A_1 | ArbiterFields.DISTANCE_1
+    | ArbiterFields.POINT_A_2 | ArbiterFields.DISTANCE_2
 )  # fmt: skip
 
 
@@ -34,6 +36,10 @@ class Crowd:
     def __init__(self, arena: Arena, poses: list[Pose]):
         self._arena, self._count = arena, len(poses)
         self._one = Physics(arena) if arena.motion.collision == "stall" else None
+        self._dt, self._steps = step_of(arena)
+        self._deepest, self._furthest = deepest(arena), furthest(arena)
+        self._radius = np.hypot(arena.robot.length, arena.robot.width) / 2
+        self._depth = np.full(self._count, -1.0)  # as in `Physics`
         self._space = new_space(arena)
         bodies = self._bodies = [self._add(pose) for pose in poses]
         self._mass, self._moment = bodies[0].mass, bodies[0].moment
@@ -56,13 +62,13 @@ class Crowd:
     def place(self, row: int, pose: Pose) -> None:
         """Put one robot at rest at a pose."""
         body = self._bodies[row]
-        body.velocity, body.angular_velocity = (0, 0), 0
-        pymunk.Body.update_position(body, self._arena.motion.physics_step)  # spends what would push it off a wall
+        spend(body, self._dt)
         body.position, body.angle = pose[:2], pose.heading
         self._space.remove(*body.shapes)  # with all contacts, as `Physics.place` has it
         self._space.add(*body.shapes)
         self.poses[row] = pose
         self.front[row] = self.rear[row] = False
+        self._depth[row] = -1.0
 
     def _add(self, pose: Pose) -> pymunk.Body:
         body, box = add_robot(self._space, self._arena)
@@ -78,21 +84,35 @@ class Crowd:
 
     def _slide(self, speed: np.ndarray, turn: np.ndarray) -> None:
         """As `Physics` does it: one solve at rest, then solve and move in turn."""
-        dt = self._arena.motion.physics_step
+        dt = self._dt
         push = np.zeros((self._count + 1, 3))  # the last row is the static body's
         ahead = self._mass * speed / dt
         push[:-1, 2] = self._moment * turn / dt
         self._set(_REST, np.zeros((self._count + 1, 3)))
         poses = self.poses
-        for _ in range(self._arena.physics_steps + 1):
+        for _ in range(self._steps + 1):
+            before, touched = poses, self._depth >= 0
             angle = poses[:, 2]
             push[:-1, 0], push[:-1, 1] = ahead * np.cos(angle), ahead * np.sin(angle)
             self._set(_PUSH, push)
             self._space.step(dt)
             poses = self._get_poses()
             self._feel(poses)
+            if touched.any():
+                self._bring_back(touched, before, poses)
         poses[:, 2] -= 2 * np.pi * np.round(poses[:, 2] / (2 * np.pi))
         self.poses = poses
+
+    def _bring_back(self, touched: np.ndarray, before: np.ndarray, poses: np.ndarray) -> None:
+        """Undo the last stride of those whom a contact has pushed too deep or too far, in `poses` too."""
+        step = poses - before
+        step[:, 2] -= 2 * np.pi * np.round(step[:, 2] / (2 * np.pi))
+        moved = np.hypot(step[:, 0], step[:, 1]) + self._radius * np.abs(step[:, 2])
+        astray = touched & ((self._depth > self._deepest) | (moved > self._furthest))
+        for row in np.flatnonzero(astray).tolist():
+            x, y, angle = before[row].tolist()
+            undo(self._bodies[row], (x, y), angle, self._dt)
+        poses[astray], self._depth[astray] = before[astray], 0.0
 
     def _set(self, fields: BodyFields, rows: np.ndarray) -> None:
         self._told.set_float_buf(rows)
@@ -104,21 +124,23 @@ class Crowd:
         return np.frombuffer(self._seen.float_buf()).reshape(-1, 3)[: self._count].copy()
 
     def _feel(self, poses: np.ndarray) -> None:
-        """Note who was stopped, in front or at the rear, in the last physics step."""
+        """Note how deep each is in contact, and who was stopped, in front or at the rear, in the last stride."""
+        self._depth[:] = -1.0
         self._felt.clear()
         get_space_arbiters(self._space, _TOUCH, self._felt)
         ids = np.frombuffer(self._felt.int_buf(), np.uintp).reshape(-1, 3)
-        floats = np.frombuffer(self._felt.float_buf()).reshape(-1, 6)
-        pressed = (ids[:, 2] > 0) & floats[:, :2].any(axis=1)
-        if not pressed.any():
+        floats = np.frombuffer(self._felt.float_buf()).reshape(-1, 8)
+        if not len(ids):
             return
-        ids, points = ids[pressed], floats[pressed, 2:].reshape(-1, 2, 2)
         found = np.searchsorted(self._ids, ids[:, :2], sorter=self._order) % self._count
         rows = self._order[found]
         mine = self._ids[rows] == ids[:, :2]
         row = np.where(mine[:, 0], rows[:, 0], rows[:, 1])
+        there = np.arange(2) < ids[:, 2:]
+        points = floats[:, 2:].reshape(-1, 2, 3)  # x, y, distance
+        np.maximum.at(self._depth, row, np.where(there, np.maximum(-points[:, :, 2], 0.0), -1.0).max(axis=1))
+        there &= (np.abs(floats[:, :2]).max(axis=1) > 0)[:, None]  # beside a wall, or leaving it: nothing presses
         x, y, heading = poses[row].T[:, :, None]
         ahead = (points[:, :, 0] - x) * np.cos(heading) + (points[:, :, 1] - y) * np.sin(heading) >= 0
-        there = np.arange(2) < ids[:, 2:]
         np.logical_or.at(self.front, row, (ahead & there).any(axis=1))
         np.logical_or.at(self.rear, row, (~ahead & there).any(axis=1))

@@ -91,7 +91,7 @@ class SimulationOfMany:
         robots = self.world.robots
         motors = np.stack([self._column(left), self._column(right)])
         ends = np.full(robots, ENDS.index(end), FLAG) if isinstance(end, str) else unpack(end, robots, kind=FLAG)
-        if (np.abs(motors) > 1).any() or (ends >= len(ENDS)).any():
+        if not (np.abs(motors) <= 1).all() or (ends >= len(ENDS)).any():  # NaN is not within either
             raise Refused("value: a command out of range")
         return motors, ends
 

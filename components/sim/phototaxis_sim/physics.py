@@ -2,6 +2,8 @@
 
 The robot is overdamped: in each physics step the solver starts from the velocity that the wheels ask
 for and takes away what the contacts forbid, so that the body is stopped by a wall and slides along it.
+A physics step that would take the body through something thin is divided into strides, and where the
+solver pushes it further than it may, between two walls for instance, the stride is not made.
 """
 
 import math
@@ -12,9 +14,10 @@ import pymunk
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError
 from phototaxis.shapes import static_shapes
+from phototaxis.strides import deepest, furthest, strides
 
 _ROBOT = 1
-_FAR = -1000.0
+_FAR = -100_000.0
 _TRIES = 10_000
 _MASS = 10.0
 _GRIP = 100.0
@@ -63,6 +66,24 @@ def add_robot(space: pymunk.Space, arena: Arena) -> tuple[pymunk.Body, pymunk.Po
     return body, box
 
 
+def step_of(arena: Arena) -> tuple[float, int]:
+    """Seconds of one stride of the solver, and how many of them make one control period."""
+    count = strides(arena)
+    return arena.motion.physics_step / count, arena.physics_steps * count
+
+
+def undo(body: pymunk.Body, position: tuple[float, float], angle: float, dt: float) -> None:
+    """Put a body back to where a stride began, at rest."""
+    spend(body, dt)
+    body.position, body.angle = position, angle
+
+
+def spend(body: pymunk.Body, dt: float) -> None:
+    """Bring a body to rest, with what the solver has in store to push it out of a wall."""
+    body.velocity, body.angular_velocity = (0, 0), 0
+    pymunk.Body.update_position(body, dt)
+
+
 class Physics:
     """The arena and the robot's body in one pymunk space.
 
@@ -76,14 +97,18 @@ class Physics:
 
     def __init__(self, arena: Arena):
         self._arena, self._robot = arena, arena.robot
-        self._dt = arena.motion.physics_step
-        self._steps = arena.physics_steps
+        self._dt, self._steps = step_of(arena)
+        self._strides = strides(arena)
+        self._deepest, self._furthest = deepest(arena), furthest(arena)
+        self._depth = -1.0
+        """How deep the body overlapped something after the last stride, m; −1 where it touched nothing."""
         self._stall = arena.motion.collision == "stall"
         self._front = self._rear = False
         space = self._space = new_space(arena)
         self._body, self._box = add_robot(space, arena)
         self._moment = self._body.moment
         size = (self._robot.length, self._robot.width)
+        self._radius = math.hypot(*size) / 2
         clear = arena.placement.clearance
         self._probe = pymunk.Poly.create_box(None, (size[0] + 2 * clear, size[1] + 2 * clear))
         space.on_collision(_ROBOT, None, post_solve=self._touched)
@@ -96,6 +121,7 @@ class Physics:
             body.velocity, body.angular_velocity = (0, 0), 0
             space.reindex_shapes_for_body(body)
             for _ in range(int(space.collision_persistence) + 1):
+                self._depth = -1.0
                 space.step(self._dt)
         self._front = self._rear = False
         return Motion(pose, 0.0, 0.0, False, False)
@@ -115,17 +141,32 @@ class Physics:
         UserError
             when 10,000 tries found none.
         """
+        return self.sample(rng, 1)[0][0]
+
+    def sample(self, rng: np.random.Generator, count: int) -> tuple[list[Pose], float]:
+        """At most `count` free poses as in `random_pose`, out of 10,000 tries; the share of the tries that were free.
+
+        Raises
+        ------
+        UserError
+            when there was none.
+        """
         width, height = self._arena.size
-        away = self._arena.placement.light_distance
-        for _ in range(_TRIES):
+        away, found = self._arena.placement.light_distance, list[Pose]()
+        for tried in range(1, _TRIES + 1):
             u, v, w = rng.random(3).tolist()
             pose = Pose(u * width, v * height, (2 * w - 1) * math.pi)
             distances = (math.dist(pose[:2], light.position) for light in self._arena.lights)
             if min(distances) >= away and self.free(pose):
-                return pose
+                found.append(pose)
+                if len(found) == count:
+                    return found, count / tried
+        if found:
+            return found, len(found) / _TRIES
         raise UserError(
             f"arena {self._arena.name}: the robot ({self._robot.length} × {self._robot.width} m) fits nowhere: no free "
-            f"place {away} m from the lights in {_TRIES} tries; make room, or lower placement.light_distance"
+            f"place {away} m from the lights in {_TRIES} tries; make room, or lower placement.light_distance or "
+            f"placement.clearance"
         )
 
     def drive(self, left: float, right: float) -> Motion:
@@ -142,9 +183,14 @@ class Physics:
         body.velocity, body.angular_velocity = (0, 0), 0
         for _ in range(self._steps + 1):
             angle = body.angle
+            before = body.position if self._depth >= 0 else None  # else no contact can push it
+            self._depth = -1.0
             body.force = push * math.cos(angle), push * math.sin(angle)
             body.torque = torque
             step(dt)
+            if before is not None and self._astray(before, angle):
+                undo(body, before, angle, dt)
+                self._depth = 0.0
         angle = body.angle
         vx, vy = body.velocity
         x, y = body.position
@@ -152,26 +198,40 @@ class Physics:
         heading = math.remainder(angle, math.tau)
         return Motion(Pose(x, y, heading), forward, body.angular_velocity, self._front, self._rear)
 
+    def _astray(self, before: tuple[float, float], angle: float) -> bool:
+        """Whether the solver has pushed the body too deep into something, or too far in one stride."""
+        moved = math.dist(before, self._body.position) + self._radius * abs(self._body.angle - angle)
+        return self._depth > self._deepest or moved > self._furthest
+
     def _refuse_contact(self, speed: float, turn: float) -> Motion:
         """A physics step that would touch anything is not made at all (the Pyro simulator's stall)."""
-        x, y = self._body.position
-        angle = self._body.angle
+        pose = Pose(*self._body.position, self._body.angle)
         moved = True
-        for _ in range(self._steps):
-            heading = angle + turn * self._dt
-            middle = (angle + heading) / 2
-            ahead = speed * self._dt
-            pose = Pose(x + ahead * math.cos(middle), y + ahead * math.sin(middle), heading)
-            moved = not self._hits(self._box, pose)
-            if moved:
-                x, y, angle = pose
+        for _ in range(self._arena.physics_steps):
+            ahead = self._ahead(pose, speed, turn)
+            moved = ahead is not None
+            if ahead is not None:
+                pose = ahead
             else:
                 self._front |= speed > 0 or (speed == 0 and turn != 0)
                 self._rear |= speed < 0
+        x, y, angle = pose
         self._body.position, self._body.angle = (x, y), angle
         heading = math.remainder(angle, math.tau)
         at_end = (speed, turn) if moved else (0.0, 0.0)
         return Motion(Pose(x, y, heading), *at_end, self._front, self._rear)
+
+    def _ahead(self, pose: Pose, speed: float, turn: float) -> Pose | None:
+        """Where a physics step leads, stride by stride; None when one of them would touch anything."""
+        for _ in range(self._strides):
+            x, y, angle = pose
+            heading = angle + turn * self._dt
+            middle = (angle + heading) / 2
+            ahead = speed * self._dt
+            pose = Pose(x + ahead * math.cos(middle), y + ahead * math.sin(middle), heading)
+            if self._hits(self._box, pose):
+                return None
+        return pose
 
     def _hits(self, shape: pymunk.Poly, pose: Pose) -> bool:
         """Whether a box of the robot's kind would touch a static shape at a pose."""
@@ -186,9 +246,11 @@ class Physics:
         return any(hit.shape is not self._box for hit in self._space.shape_query(test))
 
     def _touched(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        points = arbiter.contact_point_set.points
+        self._depth = max(self._depth, 0.0, *(-point.distance for point in points))
         if not arbiter.total_impulse:  # beside a wall, or leaving it: nothing presses
             return
-        for point in arbiter.contact_point_set.points:
+        for point in points:
             if self._body.world_to_local(point.point_a).x >= 0:
                 self._front = True
             else:

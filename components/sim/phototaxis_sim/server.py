@@ -11,6 +11,7 @@ import msgspec
 from phototaxis.bus import Bus, Event
 from phototaxis.chunks import Chunks
 from phototaxis.codec import Refused
+from phototaxis.errors import UserError
 from phototaxis.journal import Journal
 from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, Phase, SimLog, State, Status
 from phototaxis.protocol import Question
@@ -339,6 +340,8 @@ class Server:
         if snapshot is None or snapshot.run != self._sim.world.run:
             journal.begin(self._header())
             return ""
+        if snapshot.arena != self._sim.digest:
+            raise UserError(f"the run {snapshot.run} began in another arena than '{self._sim.world.arena.name}' is now")
         self._sim.restore(snapshot)
         self._recent.extend(snapshot.recent)
         journal.begin(frames[0])

@@ -6,10 +6,13 @@ import struct
 import numpy as np
 from msgspec import Struct
 from phototaxis.arena import Arena
+from phototaxis.errors import UserError
 from phototaxis.messages import Command, End, Episode, State, World
 
 from phototaxis_sim.physics import Motion, Physics, Pose
 
+_MOST_IDLE = 1000
+"""Episodes in succession that begin where the light is reached already."""
 _HASHED = struct.Struct("<8sqqqddddddd")
 
 
@@ -29,6 +32,8 @@ class Snapshot(Struct):
     """Whether the last ended episodes reached the light."""
     driver: str
     """Who held the seat."""
+    arena: str = ""
+    """`Arena.digest`."""
 
 
 class Simulation:
@@ -47,15 +52,16 @@ class Simulation:
         the present tick; `driver` is filled in by whoever keeps the seat.
     ended : Episode or None
         the episode that ended in the last `advance`.
+    digest : of the arena.
     """
 
     def __init__(self, arena: Arena, seed: int, run: str, epochs: int = 0):
-        self.world = World(run, arena, seed, epochs)
+        self.world, self.digest = World(run, arena, seed, epochs), arena.digest
         self.ended: Episode | None = None
         self.episodes = self.reached = 0
         self._physics = Physics(arena)
         self._period = arena.motion.control_period
-        self._tick = self._episode = self._epoch = self._steps = 0
+        self._tick = self._episode = self._epoch = self._steps = self._idle = 0
         self._chain = b"\0" * 8
         self._start = Pose(0, 0, 0)
         self.state = self._begin()
@@ -83,13 +89,25 @@ class Simulation:
         return Simulation(self.world.arena, seed, run, self.world.epochs)
 
     def advance(self, left: float, right: float, author: str, end: End = "") -> State:
-        """Hold a command for one control period, or end the episode; the next state."""
+        """Hold a command for one control period, or end the episode; the next state.
+
+        Raises
+        ------
+        UserError
+            when the light was reached without a step in the last 1,000 episodes: so it would go on for ever.
+        """
         self.ended = None
         self._tick += 1
         if end:
             self.ended = Episode(self.world.run, self._episode, self._tick - 1, self._steps, end, author, *self._start)
             self.episodes += 1
             self.reached += end == "reached"
+            self._idle = self._idle + 1 if end == "reached" and not self._steps else 0
+            if self._idle >= _MOST_IDLE:
+                raise UserError(
+                    f"arena {self.world.arena.name}: the light was reached before the first step in the last "
+                    f"{_MOST_IDLE} episodes; begin further from the lights (placement.light_distance), or dim them"
+                )
             self._episode += 1
             self._steps = 0
             self.state = self._begin()
@@ -112,6 +130,7 @@ class Simulation:
             self._before,
             recent,
             driver,
+            self.digest,
         )
 
     def restore(self, at: Snapshot) -> None:
