@@ -1,11 +1,7 @@
 """A guarded router: who comes in, and what each may do there; with real sessions and certificates."""
 
 import json
-import os
-import secrets
-import shutil
 import stat
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -179,32 +175,6 @@ def test_a_router_beyond_this_machine_needs_credentials(start, tmp_path):
     file.write_text(file.read_text().replace('"default_permission": "deny"', '"default_permission": "allow"'))
     assert phototaxis("router", "--zenoh-config", file).returncode == 2
     assert phototaxis("router").returncode == 2
-
-
-@pytest.fixture
-def namespace():
-    """Another network namespace; gives the words that run a command there, and our address as it sees it."""
-    ip = shutil.which("ip")
-    if os.geteuid() != 0 or ip is None:
-        pytest.skip("needs root and `ip` to make a network namespace")
-    name, net = f"pt{secrets.token_hex(3)}", f"10.213.{secrets.randbelow(256)}"
-    steps = (
-        f"{ip} netns add {name}",
-        f"{ip} link add {name}a type veth peer name {name}b netns {name}",
-        f"{ip} addr add {net}.1/30 dev {name}a",
-        f"{ip} link set {name}a up",
-        f"{ip} netns exec {name} ip addr add {net}.2/30 dev {name}b",
-        f"{ip} netns exec {name} ip link set {name}b up",
-    )
-    try:
-        for step in steps:
-            done = subprocess.run(step.split(), capture_output=True, text=True, check=False)
-            if done.returncode:
-                pytest.skip(f"this machine allows no network namespace: {step}: {done.stderr.strip()}")
-        yield [ip, "netns", "exec", name], f"{net}.1"
-    finally:
-        subprocess.run([ip, "netns", "del", name], capture_output=True, check=False)
-        subprocess.run([ip, "link", "del", f"{name}a"], capture_output=True, check=False)
 
 
 def test_a_successor_in_another_network_inherits_through_the_guarded_router(namespace, start, tmp_path):
