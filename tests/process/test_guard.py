@@ -10,9 +10,12 @@ import pytest
 import zenoh
 from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
+from phototaxis.errors import UserError
 from phototaxis.ports import free_ports
-from phototaxis.router import client_config
+from phototaxis.router import client_config, router_config
 from phototaxis.session import BusOptions, open_session
+from phototaxis_lab import check
+from phototaxis_launcher import certs as certs_command
 from support import Process, command, phototaxis, wait_status
 
 WORLDS = ("a", "b")
@@ -148,6 +151,33 @@ def test_the_shipped_configuration_and_page_are_those_of_the_tables(tmp_path):
     wrong = phototaxis("check", "rights", "--file", file, "--worlds", "a,b")
     assert wrong.returncode == 2
     assert "access_control differ" in wrong.stderr
+
+
+@pytest.mark.parametrize(
+    ("mended", "line"),
+    [
+        ('"scouting": {}', "scouting/multicast/enabled is left out, and zenohd turns it on"),
+        ('"scouting": {"multicast": {"enabled": false}}', "scouting/gossip/enabled is left out"),
+        ('"plugins": {"rest": {}}, "scouting": {}', "plugins may open doors of its own and nothing guards it"),
+    ],
+)
+def test_a_configuration_with_the_right_rights_and_an_open_door_is_refused(tmp_path, mended, line):
+    made = router_config(["a"], ["tls/0.0.0.0:7447"], tmp_path, "mtls")
+    file = tmp_path / "router.json5"
+    file.write_text(json.dumps(made).replace(f'"scouting": {json.dumps(made["scouting"])}', mended))
+    with pytest.raises(UserError, match=line):
+        check.main(["rights", "--file", str(file), "--worlds", "a"])
+
+
+def test_what_the_router_cannot_be_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words, line in (("--host=::1", "names and IPv4 addresses"), ("--worlds=a,..", "--worlds a,..")):
+        with pytest.raises(UserError, match=line):
+            certs_command.main([words])
+    assert list(tmp_path.iterdir()) == []
+    certs_command.main(["--listen=::1", "--worlds=a,a"])
+    router = json.loads("".join(Path("certs/router-mtls.json5").read_text().splitlines()[1:]))
+    assert router["listen"]["endpoints"] == ["tls/[::1]:7447"]
 
 
 def test_keys_and_passwords_are_for_their_owner_alone_and_nothing_is_overwritten(certs):

@@ -1,6 +1,7 @@
 """The same run through a router, from flags and from ZENOH_CONFIG; no door is left open unasked."""
 
 import json
+import time
 
 import pytest
 import zenoh
@@ -8,7 +9,7 @@ from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
 from phototaxis.ports import free_ports
 from phototaxis.session import BusOptions, open_session
-from support import phototaxis, wait_status
+from support import DEADLINE, phototaxis, wait_status
 
 
 @pytest.fixture
@@ -55,6 +56,31 @@ def test_a_missing_router_is_one_line(start, world):
     assert process.end() == 3
     assert process.stderr.startswith("phototaxis: error: the bus cannot be opened")
     assert process.stderr.count("\n") == 1
+
+
+def test_a_component_waits_for_its_router_when_asked(start, world):
+    endpoint = f"tcp/127.0.0.1:{free_ports(1)[0]}"
+    place = "--name", world, "--connect", endpoint
+    sim = start("sim", *place, "--wait", DEADLINE)
+    deadline = time.monotonic() + DEADLINE
+    while sim.stderr != f"waiting up to {DEADLINE:g} s for {endpoint}\n":
+        sim.alive()
+        assert time.monotonic() < deadline, sim.stderr
+    start("router", "--listen", endpoint)
+    options = BusOptions(name=world, connect=[endpoint], wait=DEADLINE)
+    with open_session("observer", options) as session, Bus(session, world, "observer", "test") as bus:
+        wait_status(bus, lambda status: status.phase == "waiting", sim)
+    assert sim.stop() == 0
+    assert sim.stderr.count("\n") == 1
+
+
+def test_a_router_that_never_comes_ends_the_wait(world):
+    endpoint = f"tcp/127.0.0.1:{free_ports(1)[0]}"
+    done = phototaxis("status", "--name", world, "--connect", endpoint, "--wait", 0.2)
+    assert done.returncode == 3
+    waited, error = done.stderr.splitlines()
+    assert waited == f"waiting up to 0.2 s for {endpoint}"
+    assert error.startswith("phototaxis: error: the bus cannot be opened")
 
 
 def test_without_a_simulation_status_says_so(world):

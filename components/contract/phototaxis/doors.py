@@ -27,6 +27,8 @@ class Door(NamedTuple):
     """A way in for somebody who is not on this machine."""
 
     what: str
+    instead: str
+    """What to do in place of it."""
     guarded: bool
     """Whether who comes in has to say who it is, and may do only what it is allowed to."""
 
@@ -72,16 +74,17 @@ def open_doors(config: zenoh.Config) -> Iterator[Door]:
             protocol = endpoint.partition("/")[0]
             certified = certificates and protocol in ("tls", "quic") and "enable_mtls" not in endpoint
             guarded = protocol in UNICAST and not _multicast(endpoint) and (passwords or certified)
-            yield Door(f"{endpoint} listens beyond this machine", guarded)
+            yield Door(f"{endpoint} listens beyond this machine", "use 127.0.0.1", guarded)
     for key in DISCOVERY:
         if get(config, key) is True:
-            yield Door(f"{key} lets others find this process", passwords or certificates)
+            yield Door(f"{key} lets strangers find this process", "leave it out", passwords or certificates)
     if get(config, "adminspace/enabled") and get(config, "adminspace/permissions/write"):
-        yield Door("adminspace/permissions/write lets others change this configuration", passwords or certificates)
+        what = "adminspace/permissions/write lets others change this configuration"
+        yield Door(what, "leave it out", passwords or certificates)
     defaults = msgspec.json.decode(str(zenoh.Config()))
     for section, value in msgspec.json.decode(str(config)).items():
         if section not in HARMLESS and value != defaults.get(section):
-            yield Door(f"{section} may listen by itself", False)
+            yield Door(f"{section} may open doors of its own", "leave it out", False)
 
 
 def refuse_open_doors(config: zenoh.Config, source: str = "") -> None:
@@ -89,8 +92,8 @@ def refuse_open_doors(config: zenoh.Config, source: str = "") -> None:
     for door in open_doors(config):
         if not door.guarded:
             raise UserError(
-                f"{source}{': ' if source else ''}{door.what} and nothing guards it; use 127.0.0.1 and leave the rest "
-                f"out, or take a router with credentials (phototaxis certs), or add --insecure"
+                f"{source}{': ' if source else ''}{door.what} and nothing guards it; {door.instead}, or a router with "
+                f"credentials (phototaxis certs), or add --insecure"
             )
 
 

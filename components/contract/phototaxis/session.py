@@ -18,10 +18,14 @@ from phototaxis.errors import Unavailable, UserError
 from phototaxis.sockets import agent_socket, alone_in, in_use, socket_folder, sweep
 from phototaxis.topics import ROLES
 
-WORLD = r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,39}"
-"""Name of a world: a folder, a part of a key and of a file's name, so neither ".." nor like an option."""
-WORLDS = rf"{WORLD}(,{WORLD})*"
-"""Several, separated by commas."""
+_WORLD = r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,39}"
+_FORM = "up to 40 letters, digits, '_', '.' and '-', the first none of the last two"
+WorldName = Annotated[str, Meta(pattern=rf"^{_WORLD}\Z", description=_FORM)]
+"""A world: a folder, a part of keys and of files' names; so never ".." and never like an option."""
+WorldNames = Annotated[
+    str, Meta(pattern=rf"^{_WORLD}(,{_WORLD})*\Z", description=f"names with commas between them, each {_FORM}")
+]
+"""Several worlds, separated by commas."""
 ATTEMPT = 1.0
 """Seconds that one attempt to reach a router takes while we wait for it."""
 
@@ -29,7 +33,7 @@ ATTEMPT = 1.0
 class BusOptions(Struct, kw_only=True):
     """Where the bus is. Without any of these: Unix sockets in a private folder of this machine."""
 
-    name: Annotated[str, Meta(pattern=f"^{WORLD}$")] = "phototaxis"
+    name: WorldName = "phototaxis"
     """name of the world on the bus, the prefix of its keys; components of one world share it"""
     listen: list[str] = []
     """endpoint to listen on, such as tcp/127.0.0.1:7447 (may be repeated)"""
@@ -193,20 +197,22 @@ def _open(config: zenoh.Config, wait: float) -> zenoh.Session:
     zenoh.ZError
         of the last attempt.
     """
-    deadline = time.monotonic() + wait
-    if wait:
-        config.insert_json5("connect/timeout_ms", str(round(1000 * min(wait, ATTEMPT))))
-    told = False
+    if not wait:
+        return zenoh.open(config)
+    deadline, told = time.monotonic() + wait, False
+    config.insert_json5("connect/timeout_ms", str(round(1000 * min(wait, ATTEMPT))))
     while True:
         try:
             return zenoh.open(config)
         except zenoh.ZError as error:
-            if not _unreachable(error) or time.monotonic() >= deadline:
+            if not _unreachable(error):
                 raise
-        if not told:
-            where = ", ".join(map(str, doors.endpoints(config, "connect")))
-            print(f"waiting up to {wait:g} s for {where}", file=sys.stderr, flush=True)
-            told = True
+            if not told:
+                where = ", ".join(map(str, doors.endpoints(config, "connect")))
+                print(f"waiting up to {wait:g} s for {where}", file=sys.stderr, flush=True)
+                told = True
+            if time.monotonic() >= deadline:
+                raise
 
 
 def _unreachable(error: zenoh.ZError) -> bool:

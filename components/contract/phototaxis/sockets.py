@@ -50,9 +50,7 @@ def _root() -> Path:
         try:
             return Path(tempfile.gettempdir()) / f"phototaxis-{os.getuid()}"
         except OSError:
-            raise Unavailable(
-                f"no folder for the sockets of this machine: nothing can be written to; {ADVICE}"
-            ) from None
+            raise Unavailable(f"no folder for temporary files can be written to; {ADVICE}") from None
     if not os.path.isabs(base):
         raise Unavailable(f"XDG_RUNTIME_DIR is '{base}', which is no absolute path; {ADVICE}")
     try:
