@@ -1,10 +1,14 @@
 """The Pythons that are promised: said alike everywhere, and everything is pinned for each of them."""
 
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+from packaging import tags
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
@@ -46,3 +50,16 @@ def test_everything_is_pinned_for_each_python(python):
         assert one.specifier.contains(PINS[canonicalize_name(one.name)]), one
     windows = [one.name for one in needed(python) if one.name.startswith("pygame")]
     assert windows == ["pygame" if python < "3.14" else "pygame-ce"]
+
+
+@pytest.mark.skipif(not os.environ.get("PHOTOTAXIS_ASK_INDEX"), reason="asks the index: set PHOTOTAXIS_ASK_INDEX=1")
+@pytest.mark.parametrize("python", PROMISED)
+def test_each_python_finds_wheels_of_all_pins(python, tmp_path):
+    other = "pygame-ce" if python < "3.14" else "pygame"
+    pins = tmp_path / "pins.txt"
+    pins.write_text("\n".join(f"{name}=={version}" for name, version in PINS.items() if name != other))
+    here = [f"--platform={platform}" for platform in tags.platform_tags()]
+    pip = [sys.executable, "-m", "pip", "install", "--dry-run", "--quiet", "--no-deps", "--ignore-installed"]
+    what = ["--only-binary=:all:", f"--target={tmp_path}", f"--python-version={python}", *here, f"--requirement={pins}"]
+    done = subprocess.run([*pip, *what], capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
