@@ -8,6 +8,7 @@ from phototaxis import doors
 from phototaxis.errors import UserError
 from phototaxis.router import router_config
 from phototaxis.session import BusOptions, open_router, open_session
+from phototaxis_recorder import __main__ as recorder
 
 HERE, ANYWHERE = "tcp/127.0.0.1:0", "tcp/0.0.0.0:0"
 SHUT = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
@@ -138,3 +139,9 @@ def test_certificates_guard_no_plain_listener(tmp_path):
 
 def test_every_section_of_zenoh_has_been_looked_at():
     assert json.loads(str(zenoh.Config())).keys() - doors.HARMLESS == {"plugins", "plugins_loading"}
+
+
+@pytest.mark.parametrize("address", ["0.0.0.0", "::", "192.168.1.5", "robot.example", ""])  # noqa: S104 - is refused
+def test_who_watches_is_no_stranger_either(address):
+    with pytest.raises(UserError, match=f"--bind {address}: others could watch"):
+        recorder.main([f"--bind={address}", "--output=/nowhere/at/all.rrd"])

@@ -104,7 +104,7 @@ def is_local(endpoint: str) -> bool:
         return True
     extra = rest.partition("#")[2]
     bound = any(word.startswith(("iface=", "join=")) for word in extra.split(";"))
-    return protocol in UNICAST and not bound and _is_loopback(_host(endpoint))
+    return protocol in UNICAST and not bound and is_loopback(_host(endpoint))
 
 
 def _host(endpoint: str) -> str:
@@ -112,7 +112,8 @@ def _host(endpoint: str) -> str:
     return address.rpartition(":")[0].strip("[]")
 
 
-def _is_loopback(host: str) -> bool:
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches what listens on that name or address."""
     address = _address(host)
     return host == "localhost" if address is None else address.is_loopback
 
