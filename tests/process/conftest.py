@@ -1,7 +1,9 @@
 """Each test has a world of its own: its name on the bus, its folder of sockets, its free ports."""
 
+import os
 import secrets
 import shutil
+import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -56,3 +58,29 @@ def up(start: Callable[..., Process], world: str, tmp_path: Path) -> Callable[..
         )
 
     return begin
+
+
+@pytest.fixture
+def namespace() -> Iterator[tuple[list[str], str]]:
+    """Another network namespace; gives the words that run a command there, and our address as it sees it."""
+    ip = shutil.which("ip")
+    if os.geteuid() != 0 or ip is None:
+        pytest.skip("needs root and `ip` to make a network namespace")
+    name, net = f"pt{secrets.token_hex(3)}", f"10.213.{secrets.randbelow(256)}"
+    steps = (
+        f"{ip} netns add {name}",
+        f"{ip} link add {name}a type veth peer name {name}b netns {name}",
+        f"{ip} addr add {net}.1/30 dev {name}a",
+        f"{ip} link set {name}a up",
+        f"{ip} netns exec {name} ip addr add {net}.2/30 dev {name}b",
+        f"{ip} netns exec {name} ip link set {name}b up",
+    )
+    try:
+        for step in steps:
+            done = subprocess.run(step.split(), capture_output=True, text=True, check=False)
+            if done.returncode:
+                pytest.skip(f"this machine allows no network namespace: {step}: {done.stderr.strip()}")
+        yield [ip, "netns", "exec", name], f"{net}.1"
+    finally:
+        subprocess.run([ip, "netns", "del", name], capture_output=True, check=False)
+        subprocess.run([ip, "link", "del", f"{name}a"], capture_output=True, check=False)

@@ -1,11 +1,7 @@
 """A guarded router: who comes in, and what each may do there; with real sessions and certificates."""
 
 import json
-import os
-import secrets
-import shutil
 import stat
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -14,9 +10,12 @@ import pytest
 import zenoh
 from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
+from phototaxis.errors import UserError
 from phototaxis.ports import free_ports
-from phototaxis.router import client_config
+from phototaxis.router import client_config, router_config
 from phototaxis.session import BusOptions, open_session
+from phototaxis_lab import check
+from phototaxis_launcher import certs as certs_command
 from support import Process, command, phototaxis, wait_status
 
 WORLDS = ("a", "b")
@@ -154,6 +153,33 @@ def test_the_shipped_configuration_and_page_are_those_of_the_tables(tmp_path):
     assert "access_control differ" in wrong.stderr
 
 
+@pytest.mark.parametrize(
+    ("mended", "line"),
+    [
+        ('"scouting": {}', "scouting/multicast/enabled is left out, and zenohd turns it on"),
+        ('"scouting": {"multicast": {"enabled": false}}', "scouting/gossip/enabled is left out"),
+        ('"plugins": {"rest": {}}, "scouting": {}', "plugins may open doors of its own and nothing guards it"),
+    ],
+)
+def test_a_configuration_with_the_right_rights_and_an_open_door_is_refused(tmp_path, mended, line):
+    made = router_config(["a"], ["tls/0.0.0.0:7447"], tmp_path, "mtls")
+    file = tmp_path / "router.json5"
+    file.write_text(json.dumps(made).replace(f'"scouting": {json.dumps(made["scouting"])}', mended))
+    with pytest.raises(UserError, match=line):
+        check.main(["rights", "--file", str(file), "--worlds", "a"])
+
+
+def test_what_the_router_cannot_be_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words, line in (("--host=::1", "names and IPv4 addresses"), ("--worlds=a,..", "--worlds a,..")):
+        with pytest.raises(UserError, match=line):
+            certs_command.main([words])
+    assert list(tmp_path.iterdir()) == []
+    certs_command.main(["--listen=::1", "--worlds=a,a"])
+    router = json.loads("".join(Path("certs/router-mtls.json5").read_text().splitlines()[1:]))
+    assert router["listen"]["endpoints"] == ["tls/[::1]:7447"]
+
+
 def test_keys_and_passwords_are_for_their_owner_alone_and_nothing_is_overwritten(certs):
     folder, _ = certs
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
@@ -179,32 +205,6 @@ def test_a_router_beyond_this_machine_needs_credentials(start, tmp_path):
     file.write_text(file.read_text().replace('"default_permission": "deny"', '"default_permission": "allow"'))
     assert phototaxis("router", "--zenoh-config", file).returncode == 2
     assert phototaxis("router").returncode == 2
-
-
-@pytest.fixture
-def namespace():
-    """Another network namespace; gives the words that run a command there, and our address as it sees it."""
-    ip = shutil.which("ip")
-    if os.geteuid() != 0 or ip is None:
-        pytest.skip("needs root and `ip` to make a network namespace")
-    name, net = f"pt{secrets.token_hex(3)}", f"10.213.{secrets.randbelow(256)}"
-    steps = (
-        f"{ip} netns add {name}",
-        f"{ip} link add {name}a type veth peer name {name}b netns {name}",
-        f"{ip} addr add {net}.1/30 dev {name}a",
-        f"{ip} link set {name}a up",
-        f"{ip} netns exec {name} ip addr add {net}.2/30 dev {name}b",
-        f"{ip} netns exec {name} ip link set {name}b up",
-    )
-    try:
-        for step in steps:
-            done = subprocess.run(step.split(), capture_output=True, text=True, check=False)
-            if done.returncode:
-                pytest.skip(f"this machine allows no network namespace: {step}: {done.stderr.strip()}")
-        yield [ip, "netns", "exec", name], f"{net}.1"
-    finally:
-        subprocess.run([ip, "netns", "del", name], capture_output=True, check=False)
-        subprocess.run([ip, "link", "del", f"{name}a"], capture_output=True, check=False)
 
 
 def test_a_successor_in_another_network_inherits_through_the_guarded_router(namespace, start, tmp_path):

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
 from phototaxis.messages import Count, Seed, World
+from phototaxis.session import WorldNames
 
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.server import Mode, Server
@@ -19,7 +19,7 @@ from phototaxis_agent.setup import parse_setup
 class Options(ComponentOptions, kw_only=True):
     """Options of the agent process."""
 
-    worlds: Annotated[str, Meta(pattern=r"^([A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*)?$")] = ""
+    worlds: WorldNames | None = None
     """in place of --name: several worlds, separated by commas, each driven by an agent of its own in this process"""
     checkpoint: str = ""
     """file to keep the learner's state in (.npz); with --worlds a folder, in it WORLD.npz"""

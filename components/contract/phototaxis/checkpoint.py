@@ -6,6 +6,7 @@ The file is a NumPy .npz without pickles: the learner's arrays, and `meta`, the 
 import hashlib
 import io
 import os
+import secrets
 import zipfile
 import zlib
 from pathlib import Path
@@ -123,7 +124,7 @@ def decode(data: bytes, source: str) -> tuple[Meta, dict[str, np.ndarray]]:
 
 def save(path: Path, meta: Meta, arrays: dict[str, np.ndarray]) -> None:
     """Write a checkpoint; a reader sees the old file or the new one, never a part."""
-    fresh = path.with_suffix(path.suffix + ".new")
+    fresh = path.with_name(f"{path.name}.{secrets.token_hex(4)}.new")  # of several writers each has its own
     fresh.write_bytes(encode(meta, arrays))
     os.replace(fresh, path)
 

@@ -70,8 +70,8 @@ def _stop(buses: Sequence[Bus], *_: object) -> None:
 
 
 def made_up(label: str, word: str = "") -> str:
-    """A name on the bus that is not taken."""
-    return "-".join(filter(None, (label[:19], word, secrets.token_hex(2))))
+    """A name on the bus that nobody else has: many may start at the same moment."""
+    return "-".join(filter(None, (label[:15], word, secrets.token_hex(4))))
 
 
 def _hold_tether(stop: Callable[[], None]) -> None:

@@ -1,30 +1,39 @@
 """Opening a Zenoh session: from flags, a Zenoh config file, ZENOH_CONFIG, or this machine's own sockets."""
 
-import fcntl
-import getpass
-import ipaddress
 import json
 import os
 import re
-import stat
-import tempfile
+import sys
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import msgspec
 import zenoh
 from msgspec import Meta, Struct
 
+from phototaxis import doors
 from phototaxis.errors import Unavailable, UserError
+from phototaxis.sockets import agent_socket, alone_in, in_use, socket_folder, sweep
 from phototaxis.topics import ROLES
+
+_WORLD = r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,39}"
+_FORM = "up to 40 letters, digits, '_', '.' and '-', the first none of the last two"
+WorldName = Annotated[str, Meta(pattern=rf"^{_WORLD}\Z", description=_FORM)]
+"""A world: a folder, a part of keys and of files' names; so never ".." and never like an option."""
+WorldNames = Annotated[
+    str, Meta(pattern=rf"^{_WORLD}(,{_WORLD})*\Z", description=f"names with commas between them, each {_FORM}")
+]
+"""Several worlds, separated by commas."""
+ATTEMPT = 1.0
+"""Seconds that one attempt to reach a router takes while we wait for it."""
 
 
 class BusOptions(Struct, kw_only=True):
     """Where the bus is. Without any of these: Unix sockets in a private folder of this machine."""
 
-    name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[A-Za-z0-9_.-]+$")] = "phototaxis"
+    name: WorldName = "phototaxis"
     """name of the world on the bus, the prefix of its keys; components of one world share it"""
     listen: list[str] = []
     """endpoint to listen on, such as tcp/127.0.0.1:7447 (may be repeated)"""
@@ -34,27 +43,8 @@ class BusOptions(Struct, kw_only=True):
     """a Zenoh configuration file (JSON5); the variable ZENOH_CONFIG names one too"""
     insecure: bool = False
     """allow listening on addresses other than this machine's own"""
-
-
-def socket_folder(name: str) -> Path:
-    """The private folder (mode 0700) that holds the Unix sockets of one world; made where missing.
-
-    Raises
-    ------
-    Unavailable
-        when the folder belongs to somebody else or others may enter it.
-    """
-    base = os.environ.get("XDG_RUNTIME_DIR")
-    root = Path(base) / "phototaxis" if base else Path(tempfile.gettempdir()) / f"phototaxis-{getpass.getuser()}"
-    folder = root / name
-    for part in (root, folder):
-        part.mkdir(mode=0o700, parents=True, exist_ok=True)
-        info = part.lstat()
-        if not stat.S_ISDIR(info.st_mode) or info.st_uid != os.getuid() or info.st_mode & 0o077:
-            raise Unavailable(f"{part} is not a private folder of this user; remove it or set XDG_RUNTIME_DIR")
-    if len(str(folder)) > 75:
-        raise Unavailable(f"{folder} is too long for a Unix socket; set XDG_RUNTIME_DIR to a shorter folder")
-    return folder
+    wait: Annotated[float, Meta(ge=0)] = 0.0
+    """seconds to wait for a router that cannot be reached yet"""
 
 
 def local_config(role: str, name: str, ident: str) -> zenoh.Config:
@@ -62,32 +52,16 @@ def local_config(role: str, name: str, ident: str) -> zenoh.Config:
 
     Of agents there may be several, so each has a socket of its own.
     """
-    folder = socket_folder(name)
-    place = ROLES[role]
-    if role == "agent":
-        _sweep(folder)
-    own = _agent_socket(folder, ident) if role == "agent" else folder / role
+    folder, place = socket_folder(name), ROLES[role]
     return _config(
         "peer",
-        listen=[f"unixsock-stream/{own}"] if place.listens else [],
+        listen=[f"unixsock-stream/{_own_socket(folder, role, ident)}"] if place.listens else [],
         connect=[f"unixsock-stream/{folder}/{other}" for other in place.dials],
     )
 
 
-def _agent_socket(folder: Path, ident: str) -> Path:
-    return folder / f"agent-{ident}"
-
-
-def _sweep(folder: Path) -> None:
-    """Remove the sockets that killed agents left: nobody holds their locks."""
-    for lock in folder.glob("agent-*.lock"):
-        with lock.open() as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                continue
-            lock.with_suffix("").unlink(missing_ok=True)
-            lock.unlink(missing_ok=True)
+def _own_socket(folder: Path, role: str, ident: str) -> Path:
+    return agent_socket(folder, ident) if role == "agent" else folder / role
 
 
 @contextmanager
@@ -100,7 +74,7 @@ def reaching(own: zenoh.Session, options: BusOptions, ident: str) -> Iterator[ze
     if _elsewhere(options):
         yield own
         return
-    socket = _agent_socket(socket_folder(options.name), ident)
+    socket = agent_socket(socket_folder(options.name), ident)
     try:
         passing = zenoh.open(_config("client", [], [f"unixsock-stream/{socket}"])) if socket.exists() else None
     except zenoh.ZError:
@@ -151,32 +125,26 @@ def open_session(role: str, options: BusOptions, ident: str = "") -> zenoh.Sessi
 
     `--listen` and `--connect` win over `--zenoh-config`, that over ZENOH_CONFIG, and that over the
     sockets of this machine. With `--connect` alone the component is a client (of a router, or of a
-    listening peer); with `--listen` a peer.
+    listening peer); with `--listen` a peer. With `--wait` it tries for so long.
 
     Raises
     ------
     UserError
-        for a configuration that cannot be read, or a listener beyond this machine without `--insecure`.
+        for a configuration that cannot be read, or that lets strangers in without `--insecure`.
     Unavailable
         when an endpoint is taken or cannot be reached.
     """
+    if not _elsewhere(options):
+        return _open_local(role, options.name, ident)
     if options.listen or options.connect:
-        config = _config("peer" if options.listen else "client", options.listen, options.connect)
-    elif _file(options):
-        config = _from_file(_file(options))
+        config = _from_flags("peer" if options.listen else "client", options)
     else:
-        config = local_config(role, options.name, ident)
-    _refuse_open_doors(config, options)
+        config = _from_file(options)
     try:
-        return zenoh.open(config)
+        return _open(config, options.wait)
     except zenoh.ZError as error:
-        text = str(error)
-        if "listener" in text and not _elsewhere(options):
-            raise Unavailable(
-                f"a {role} is already running in the world '{options.name}'; end it or choose another --name"
-            ) from None
-        where = _get(config, "connect/endpoints")
-        who = f"; {where} may be down, or does not accept who we say we are" if "connect" in text and where else ""
+        where = doors.get(config, "connect/endpoints")
+        who = f"; {where} may be down, or does not accept who we say we are" if _unreachable(error) and where else ""
         raise Unavailable(f"the bus cannot be opened: {_first_line(error)}{who}") from None
 
 
@@ -189,72 +157,88 @@ def open_router(options: BusOptions) -> zenoh.Session:
         as in `open_session`, and when neither is given.
     """
     if options.listen:
-        config = _config("router", options.listen, options.connect)
+        config = _from_flags("router", options)
     elif _file(options):
-        config = _from_file(_file(options))
+        config = _from_file(options)
     else:
         raise UserError("a router needs --listen ENDPOINT, as in tcp/127.0.0.1:7447, or --zenoh-config FILE")
-    if _get(config, "mode") != "router":
-        raise UserError(f"{_file(options)}: not the configuration of a router: its mode is {_get(config, 'mode')}")
-    _refuse_open_doors(config, options)
+    mode = doors.get(config, "mode")
+    if mode != "router":
+        raise UserError(f"{_file(options)}: not the configuration of a router: its mode is {mode or 'left out'}")
+    if not doors.endpoints(config, "listen"):
+        raise UserError(f"{_file(options)}: names no endpoint to listen on, such as tcp/127.0.0.1:7447")
     try:
-        return zenoh.open(config)
+        return _open(config, options.wait)
     except zenoh.ZError as error:
         raise Unavailable(f"the router cannot be opened: {_first_line(error)}") from None
 
 
-def _from_file(file: str) -> zenoh.Config:
+def _open_local(role: str, name: str, ident: str) -> zenoh.Session:
+    """A session on this machine's own sockets."""
+    config, folder = local_config(role, name, ident), socket_folder(name)
+    with alone_in(folder) if role == "agent" else nullcontext():
+        if role == "agent":
+            sweep(folder)
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError as error:
+            if not ROLES[role].listens or not in_use(_own_socket(folder, role, ident)):
+                raise Unavailable(f"the bus cannot be opened: {_first_line(error)}") from None
+    if role == "agent":
+        raise Unavailable(f"an agent '{ident}' is already running in the world '{name}'; choose another --ident")
+    raise Unavailable(f"a {role} is already running in the world '{name}'; end it or choose another --name")
+
+
+def _open(config: zenoh.Config, wait: float) -> zenoh.Session:
+    """Open a session; where its router cannot be reached, try again for `wait` seconds, and say so.
+
+    Raises
+    ------
+    zenoh.ZError
+        of the last attempt.
+    """
+    if not wait:
+        return zenoh.open(config)
+    deadline, told = time.monotonic() + wait, False
+    config.insert_json5("connect/timeout_ms", str(round(1000 * min(wait, ATTEMPT))))
+    while True:
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError as error:
+            if not _unreachable(error):
+                raise
+            if not told:
+                where = ", ".join(map(str, doors.endpoints(config, "connect")))
+                print(f"waiting up to {wait:g} s for {where}", file=sys.stderr, flush=True)
+                told = True
+            if time.monotonic() >= deadline:
+                raise
+
+
+def _unreachable(error: zenoh.ZError) -> bool:
+    return "Unable to connect" in str(error)
+
+
+def _from_flags(mode: str, options: BusOptions) -> zenoh.Config:
+    config = _config(mode, options.listen, options.connect)
+    if not options.insecure:
+        doors.refuse_open_doors(config)
+    return config
+
+
+def _from_file(options: BusOptions) -> zenoh.Config:
+    """A file's configuration, in which everything is shut that the file does not ask for."""
+    file = _file(options)
     try:
-        return zenoh.Config.from_file(file)
+        config = zenoh.Config.from_file(file)
     except zenoh.ZError as error:
         raise UserError(f"{file}: not a Zenoh configuration: {_first_line(error)}") from None
-
-
-def _get(config: zenoh.Config, key: str) -> Any:
-    """A value of a configuration; None where there is none."""
-    try:
-        return msgspec.json.decode(config.get_json(key))
-    except (zenoh.ZError, msgspec.DecodeError):
-        return None
-
-
-def listeners(config: zenoh.Config) -> list[str]:
-    """The endpoints that a configuration listens on."""
-    found = _get(config, "listen/endpoints")
-    if isinstance(found, dict):
-        found = found.get(_get(config, "mode") or "peer", [])
-    return [item if isinstance(item, str) else item.get("endpoint", "") for item in found or []]
-
-
-def _guarded(config: zenoh.Config) -> bool:
-    """Whether who comes in must say who they are, and may only do what they are allowed to."""
-    certificates = _get(config, "transport/link/tls/enable_mtls")
-    passwords = _get(config, "transport/auth/usrpwd/dictionary_file")
-    may = _get(config, "access_control") or {}
-    return bool((certificates or passwords) and may.get("enabled") and may.get("default_permission") == "deny")
-
-
-def _refuse_open_doors(config: zenoh.Config, options: BusOptions) -> None:
-    if not options.insecure and not _guarded(config):
-        for endpoint in listeners(config):
-            refuse_open_door(endpoint)
-
-
-def refuse_open_door(endpoint: str) -> None:
-    """Raise UserError unless the endpoint is a Unix socket or a loopback address."""
-    protocol, _, address = endpoint.partition("/")
-    if protocol.startswith("unix"):
-        return
-    host = address.split("#")[0].rpartition(":")[0].strip("[]")
-    try:
-        local = host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        local = False
-    if not local:
-        raise UserError(
-            f"{endpoint} listens beyond this machine and nothing guards it; use 127.0.0.1, or a router with "
-            f"credentials (phototaxis certs), or add --insecure"
-        )
+    doors.shut(config)
+    if not options.insecure:
+        doors.refuse_open_doors(config, file)
+    if not any(doors.endpoints(config, what) for what in ("listen", "connect")):
+        raise UserError(f"{file}: names no endpoint to listen on or to connect to, such as tcp/127.0.0.1:7447")
+    return config
 
 
 def _first_line(error: Exception) -> str:

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 import zenoh
 from msgspec import Meta
-from phototaxis import rights, wire
+from phototaxis import doors, rights, wire
 from phototaxis.errors import UserError
 from phototaxis.options import parse
 from phototaxis.router import router_config, text
-from phototaxis.session import BusOptions
+from phototaxis.session import BusOptions, WorldNames
 
 ROUTER = "deploy/zenoh/router.json5"
 WIRE = "docs/wire.md"
@@ -27,7 +27,7 @@ class Options(BusOptions, kw_only=True):
     whether a router's configuration says so. wire: whether the page about the wire format is up to date"""
     file: str = ""
     """rights, wire: the file to compare (default: the one in the repository)"""
-    worlds: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*$")] = "phototaxis"
+    worlds: WorldNames = "phototaxis"
     """rights: names of the worlds, separated by commas"""
     write: bool = False
     """rights, wire: write the file instead of comparing it"""
@@ -69,15 +69,24 @@ def _rights(options: Options) -> int:
             f"{file}: {' and '.join(differing)} differ from the tables of topics and roles (worlds: {options.worlds}); "
             f"write it anew with --write"
         )
+    _refuse_gaps(file, found)
     print(f"{file} says the same", file=sys.stderr)
     return 0
+
+
+def _refuse_gaps(file: Path, found: zenoh.Config) -> None:
+    """UserError for what lets strangers in, or would where Zenoh's own `zenohd` reads the file."""
+    doors.refuse_open_doors(found, str(file))
+    for key in doors.DISCOVERY:
+        if doors.get(found, key) is None:
+            raise UserError(f"{file}: {key} is left out, and zenohd turns it on; set it to false")
 
 
 def _wire(options: Options) -> int:
     file = Path(options.file or WIRE)
     if options.write:
         _put(file, wire.page())
-    elif not file.exists() or file.read_text() != wire.page():
+    elif not file.exists() or file.read_bytes() != wire.page().encode():
         raise UserError(f"{file}: not up to date; write it anew with: phototaxis check wire --write")
     else:
         print(f"{file} is up to date", file=sys.stderr)

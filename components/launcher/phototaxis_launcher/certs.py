@@ -2,6 +2,7 @@
 
 import os
 import secrets
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,9 +13,9 @@ from phototaxis.errors import UserError
 from phototaxis.options import parse
 from phototaxis.rights import subject
 from phototaxis.router import Auth, client_config, router_config, text
+from phototaxis.session import WorldNames
 from phototaxis.topics import ROLES
 
-NAMES = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*$")]
 MADE_BY = "phototaxis certs"
 
 
@@ -23,10 +24,10 @@ class Options(Struct, kw_only=True):
 
     out: str = "certs"
     """folder to make; it must not exist"""
-    worlds: NAMES = "phototaxis"
+    worlds: WorldNames = "phototaxis"
     """names of the worlds, separated by commas"""
     host: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.:-]+$")] = "localhost"
-    """name or address under which the clients reach the router"""
+    """name or IPv4 address under which the clients reach the router"""
     listen: Annotated[str, Meta(pattern=r"^[0-9a-fA-F.:]+$")] = "127.0.0.1"
     """address that the router listens on; 0.0.0.0: all of its machine's"""
     port: Annotated[int, Meta(ge=1, le=65535)] = 7447
@@ -39,6 +40,8 @@ def main(argv: Sequence[str]) -> int:
         "configurations of a router that knows them and of its clients."
     )
     options = parse(Options, argv, "phototaxis certs", about)
+    if ":" in options.host:
+        raise UserError(f"--host {options.host}: Zenoh's TLS knows names and IPv4 addresses; give one of these")
     folder = Path(options.out).resolve()
     try:
         folder.mkdir(mode=0o700, parents=True)
@@ -46,7 +49,11 @@ def main(argv: Sequence[str]) -> int:
         raise UserError(f"--out {options.out}: exists already; remove it or choose another folder") from None
     except OSError as error:
         raise UserError(f"--out {options.out}: {error.strerror}") from None
-    make(folder, options.worlds.split(","), options.host, options.listen, options.port)
+    try:
+        make(folder, list(dict.fromkeys(options.worlds.split(","))), options.host, options.listen, options.port)
+    except OSError as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise UserError(f"--out {options.out}: {error.strerror}") from None
     print(
         f"{folder}: router-mtls.json5 and router-password.json5 for `phototaxis router --zenoh-config`, and for each "
         f"component WORLD.ROLE.mtls.json5 and WORLD.ROLE.password.json5 for its --zenoh-config",
@@ -65,7 +72,7 @@ def make(folder: Path, worlds: Sequence[str], host: str, listen: str, port: int)
     _certify(authority.issue_cert(*{host, "localhost", "127.0.0.1"}), folder, "router")
     passwords = {name: secrets.token_urlsafe(18) for name in names}
     _write(folder / "users.txt", "".join(f"{name}:{word}\n" for name, word in passwords.items()).encode())
-    door, here = f"tls/{listen}:{port}", f"tls/{host}:{port}"
+    door, here = f"tls/{f'[{listen}]' if ':' in listen else listen}:{port}", f"tls/{host}:{port}"
     ways: tuple[Auth, ...] = ("mtls", "password")
     for auth in ways:
         config = router_config(worlds, [door], folder, auth)

@@ -14,12 +14,13 @@ from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
 from phototaxis.errors import ComponentFailed, UserError, warn
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import MOST, Count, Launch, LaunchReply, Seed, Status, run_name
+from phototaxis.messages import MOST, Count, Launch, LaunchReply, Seed, Status
 from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.ports import find_ports
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
 
+from phototaxis_launcher.folder import run_folder
 from phototaxis_launcher.processes import Child
 from phototaxis_launcher.progress import Progress
 
@@ -65,12 +66,8 @@ class Run:
     def __init__(self, options: UpOptions, fmus: FmuOptions, agent_words: list[str]):
         self._options, self._words = options, agent_words
         swaps = swap_plan(options.swap)
-        self.name = run_name()
-        self.folder = Path(options.out).resolve() / self.name
-        try:
-            self.folder.mkdir(parents=True)
-        except OSError as error:
-            raise UserError(f"--out {options.out}: {error.strerror}") from None
+        self.folder = run_folder(Path(options.out))
+        self.name = self.folder.name
         self.checkpoint = self._checkpoint("agent")
         """That of the agent that drove last."""
         self.recording = self.folder / "recording.rrd"

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
+from phototaxis import doors
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
@@ -22,7 +23,7 @@ class Options(ComponentOptions, kw_only=True):
     output: str = "recording.rrd"
     """file to record into, or a folder for RUN.rrd; where it stands already, the new one gets a number"""
     bind: str = "127.0.0.1"
-    """address that the viewer's ports listen on"""
+    """address that the viewer's ports listen on; with --insecure one that others reach"""
     grpc_port: Annotated[int, Meta(ge=0, le=65535)] = 9876
     """port of the live Rerun server; 0: any free one"""
     web_port: Annotated[int, Meta(ge=-1, le=65535)] = 9090
@@ -33,6 +34,10 @@ class Options(ComponentOptions, kw_only=True):
 
 def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis recorder", "Record the run on the bus, live and on disk.")
+    if not options.insecure and not doors.is_loopback(options.bind):
+        raise UserError(
+            f"--bind {options.bind}: others could watch, and nothing guards that; use 127.0.0.1, or add --insecure"
+        )
     import rerun as rr
 
     from phototaxis_recorder.server import Server

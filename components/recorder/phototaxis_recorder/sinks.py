@@ -30,12 +30,18 @@ def open_recording(world: World, file: Path, host: str, grpc_port: int, memory: 
 
 
 def fresh_file(wanted: Path) -> Path:
-    """`wanted`, or the same with -2, -3, … where a file stands already: no recording is overwritten."""
+    """`wanted`, or the same with -2, -3, … where a file stands already: no recording is overwritten.
+
+    The file is made here, empty, so that of recorders that start at the same moment each has its own.
+    """
     file, number = wanted, 1
-    while file.exists():
-        number += 1
-        file = wanted.with_name(f"{wanted.stem}-{number}{wanted.suffix}")
-    return file
+    while True:
+        try:
+            file.touch(exist_ok=False)
+            return file
+        except FileExistsError:
+            number += 1
+            file = wanted.with_name(f"{wanted.stem}-{number}{wanted.suffix}")
 
 
 def complete(file: Path) -> None:

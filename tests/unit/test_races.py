@@ -1,0 +1,69 @@
+"""What starts at the same moment gets files of its own."""
+
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import msgspec
+import numpy as np
+import pytest
+from phototaxis import checkpoint
+from phototaxis.component import made_up
+from phototaxis.errors import UserError
+from phototaxis.messages import World
+from phototaxis_launcher import folder
+from phototaxis_recorder.sinks import fresh_file
+
+MANY = 8
+
+
+def together(work):
+    """What `work` returns in each of many threads that begin at the same moment."""
+    begin = Barrier(MANY)
+
+    def one(number):
+        begin.wait(10)
+        return work(number)
+
+    with ThreadPoolExecutor(MANY) as pool:
+        return list(pool.map(one, range(MANY)))
+
+
+def test_runs_that_have_the_same_name_have_two_folders(tmp_path, monkeypatch):
+    names = iter(["one", "one", "two"])
+    monkeypatch.setattr(folder, "run_name", lambda: next(names))
+    assert [folder.run_folder(tmp_path / "runs").name for _ in range(2)] == ["one", "two"]
+
+
+def test_runs_that_start_together_have_folders_of_their_own(tmp_path):
+    assert len(set(together(lambda _: folder.run_folder(tmp_path / "runs")))) == MANY
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(UserError, match=r"--out .*/file: Not a directory"):
+        folder.run_folder(tmp_path / "file")
+
+
+def test_recorders_that_start_together_have_files_of_their_own(tmp_path):
+    found = together(lambda _: fresh_file(tmp_path / "recording.rrd").name)
+    assert sorted(found) == sorted(["recording.rrd", *(f"recording-{number}.rrd" for number in range(2, MANY + 1))])
+
+
+def test_a_checkpoint_that_many_write_is_one_of_theirs(tmp_path, setup, paper):
+    path = tmp_path / "c.npz"
+    meta, _ = setup.agent(World("r", paper, 0, 0)).checkpoint()
+
+    def save(number):
+        arrays = {"values": np.full(100_000, float(number))}
+        whole = msgspec.structs.replace(meta, learner_hash=checkpoint.learner_hash(arrays))
+        for _ in range(5):
+            checkpoint.save(path, whole, arrays)
+            checkpoint.load(path)
+
+    together(save)
+    assert [file.name for file in tmp_path.iterdir()] == ["c.npz"]
+
+
+def test_names_on_the_bus_differ():
+    assert len({made_up("agent") for _ in range(500)}) == 500
+    assert len(made_up("a-learner-with-a-long-name")) == 24
