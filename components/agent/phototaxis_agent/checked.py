@@ -43,11 +43,11 @@ class CheckedLearner(Learner):
         rng: np.random.Generator,
         where: Callable[[], str],
     ):
-        self._name, self._kind, self._where = name, kind, where
-        self._percept, self._actions = percept, len(percept.actions)
+        self.name, self._kind, self._where = name, kind, where
+        self._options, self._percept, self._actions = options, percept, len(percept.actions)
         self._learner = self._call("its constructor", None, lambda: kind(options, percept, rng))
-        self.context = self._context(self._learner.context)
-        self.save()
+        self.context = self._context("its context", self._learner.context)
+        self._give_back(self, self.save())
 
     def seen_from(self, where: Callable[[], str]) -> "CheckedLearner":
         """The same learner for a host that counts steps of its own."""
@@ -83,7 +83,7 @@ class CheckedLearner(Learner):
             self._broken(f"remember() gave {_described(context)}; expected {expected}", state)
         if isinstance(gain, np.ndarray):
             return tuple(self._of_many(one, gain.shape) for one in context)
-        return context if not context or _plain(context) else self._context(context, state)
+        return context if not context or _plain(context) else self._context("remember()", context, state)
 
     def values_of(self, states: np.ndarray) -> np.ndarray:
         if self._kind.values_of is Learner.values_of:
@@ -99,11 +99,11 @@ class CheckedLearner(Learner):
         named: dict[Any, np.ndarray] = {}
         for name, array in arrays.items():
             try:
-                named[name] = np.array(_array(array))
+                named[name] = _array(array)
             except Exception:  # whatever an array of somebody's library raises
                 self._broken(f"save() gave {_described(array)} as '{name}', which is no array of numbers")
         try:
-            return storable(named)
+            return {name: array.copy() for name, array in storable(named).items()}
         except UserError as why:
             self._broken(f"save(): {why}")
 
@@ -118,17 +118,28 @@ class CheckedLearner(Learner):
         if learner_hash(self.save()) != learner_hash(arrays):
             self._broken("load() does not bring back what save() gave: saved again, it is something else")
 
+    def prove(self, arrays: dict[str, np.ndarray]) -> None:
+        """Try whether a fresh learner of this kind can take over what this one has saved."""
+        fresh = CheckedLearner(self.name, self._kind, self._options, self._percept, np.random.default_rng(), self._where)
+        self._give_back(fresh, arrays)
+
+    def _give_back(self, learner: "CheckedLearner", arrays: dict[str, np.ndarray]) -> None:
+        try:
+            learner.load(arrays)
+        except ValueError as error:
+            self._broken(f"load() does not take what save() gave: {error}")
+
     def _call(self, what: str, state: Any, call: Callable[[], T]) -> T:
         try:
             return call()
         except (Exception, SystemExit) as error:
             self._raised(what, error, state)
 
-    def _context(self, context: Any, state: Any = None) -> tuple[float, ...]:
+    def _context(self, what: str, context: Any, state: Any = None) -> tuple[float, ...]:
         """A context as numbers; whole ones stay whole, so that a state is the same when it is met again."""
         if not isinstance(context, tuple):
-            self._broken(f"its context is {_described(context)}; expected a tuple of numbers", state)
-        self._numbers("its context", context, (len(context),), state)
+            self._broken(f"{what} is {_described(context)}; expected a tuple of numbers", state)
+        self._numbers(what, context, (len(context),), state)
         return tuple(_array(one).item() for one in context)
 
     def _of_many(self, given: Any, shape: tuple[int, ...]) -> np.ndarray:
@@ -162,14 +173,14 @@ class CheckedLearner(Learner):
     def _place(self, error: BaseException) -> str:
         """File and line of the learner's own code where it happened."""
         frames = [one for one in traceback.extract_tb(error.__traceback__) if one.filename != __file__]
-        files = {getattr(sys.modules.get(one.__module__), "__file__", "") for one in self._kind.__mro__ if one is not Learner}
+        files = [getattr(sys.modules.get(one.__module__), "__file__", "") for one in self._kind.__mro__]
         own = [one for one in frames if one.filename in files] or frames
-        return f"{own[-1].filename}, line {own[-1].lineno}" if own else ", ".join(map(str, files))
+        return f"{own[-1].filename}, line {own[-1].lineno}" if own else str(files[0])
 
     def _broken(self, text: str, state: Any = None, cause: BaseException | None = None) -> NoReturn:
         met = "" if state is None else f", state ({', '.join(f'{one:g}' for one in state)})" if _single(state) else ""
         where = self._where()
-        raise ComponentFailed(f"learner {self._name}: {text}{f'; {where}{met}' if where else ''}") from cause
+        raise ComponentFailed(f"learner {self.name}: {text}{f'; {where}{met}' if where else ''}") from cause
 
 
 def _plain(numbers: Any) -> bool:

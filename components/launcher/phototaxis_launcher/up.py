@@ -67,6 +67,7 @@ class Run:
     def __init__(self, options: UpOptions, fmus: FmuOptions, agent_words: list[str]):
         self._options, self._words, self._fmus = options, agent_words, fmus
         self._complained = False
+        self._drove: set[str] = set()
         swaps = swap_plan(options.swap)
         self.name = run_name()
         self.folder = Path(options.out).resolve() / self.name
@@ -156,6 +157,7 @@ class Run:
                         self._report(status, progress)
                         self._complain(status, progress)
                         self._confirm(status)
+                        self._miss(status, progress)
                     if self.children["agent"].process is None:
                         self._start_agent(status, deadline, progress)
             finally:
@@ -199,6 +201,16 @@ class Run:
             for seating in status.drivers:
                 if seating.driver in child.idents:
                     self._answer(child, LaunchReply(agent=seating.driver, tick=seating.tick))
+
+    def _miss(self, status: Status, progress: Progress) -> None:
+        """Bring back an agent that ended without a word, though nobody has taken the seat over from it."""
+        self._drove |= {one.driver for one in status.drivers}
+        last = status.drivers[-1].driver if status.drivers else ""
+        for agent in self.agents:
+            drove = self._drove & {*agent.idents}
+            if agent.left and status.phase != "finished" and not status.driver and (last in drove or not drove):
+                agent.bring_back()
+                progress.say(f"{agent.name} ended before its time and was restarted; see {self.folder}")
 
     def _answer(self, child: Child, reply: LaunchReply) -> bool:
         """Answer who asked for this agent; whether somebody had."""
