@@ -1,6 +1,8 @@
 """The action-perception loop around a learner (section 5.1 and figure 7 of the paper)."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from operator import mul
 from typing import Any, NamedTuple
 
@@ -135,21 +137,32 @@ class Agent:
         """Q of every state and action, flattened row by row, 9 a row; 0 where an action is not allowed."""
         rows = np.zeros((len(self.visits), len(ACTIONS)))
         allowed = list(self.percept.actions)
-        for number, state in enumerate(np.ndindex(*self.percept.sizes)):
-            rows[number, allowed] = self.learner.values((*state, *self.learner.context))
+        with self._aside():
+            for number, state in enumerate(np.ndindex(*self.percept.sizes)):
+                rows[number, allowed] = self.learner.values((*state, *self.learner.context))
         return rows.ravel().tolist()
 
     def current(self) -> list[float]:
         """Q of the present percept for each of the 9 actions; 0 where an action is not allowed."""
         row = [0.0] * len(ACTIONS)
         if self._state is not None:
-            for action, value in zip(self.percept.actions, self.learner.values(self._state), strict=True):
+            with self._aside():
+                values = self.learner.values(self._state)
+            for action, value in zip(self.percept.actions, values, strict=True):
                 row[action] = float(value)
         return row
 
+    @contextmanager
+    def _aside(self) -> Iterator[None]:
+        """Ask the learner something without an influence on the run: what it draws meanwhile is drawn again."""
+        drawn = self._rng.bit_generator.state
+        yield
+        self._rng.bit_generator.state = drawn
+
     def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
         """Everything needed to continue bit for bit."""
-        arrays = {**self.learner.save()}
+        with self._aside():
+            arrays = self.learner.save()
         digest, command = learner_hash(arrays), self.command
         meta = Meta(
             learner=self.name,

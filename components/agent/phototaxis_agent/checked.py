@@ -13,6 +13,7 @@ from phototaxis.task import Percept, State
 from phototaxis_agent.learner import Learner, Transition
 
 T = TypeVar("T")
+_OWN = {float, int}
 
 
 class CheckedLearner(Learner):
@@ -46,6 +47,7 @@ class CheckedLearner(Learner):
         self.name, self._kind, self._where = name, kind, where
         self._options, self._percept, self._actions = options, percept, len(percept.actions)
         self._learner = self._call("its constructor", None, lambda: kind(options, percept, rng))
+        self._remembers = kind.remember is not Learner.remember
         self.context = self._context("its context", self._learner.context)
         self._give_back(self, self.save())
 
@@ -74,6 +76,8 @@ class CheckedLearner(Learner):
         return float(self._numbers("learn()", error, (), transition.state))
 
     def remember(self, state: Any, action: Any, gain: Any) -> tuple[Any, ...]:
+        if not self._remembers:
+            return ()
         try:
             context = self._learner.remember(state, action, gain)
         except (Exception, SystemExit) as error:
@@ -83,7 +87,7 @@ class CheckedLearner(Learner):
             self._broken(f"remember() gave {_described(context)}; expected {expected}", state)
         if isinstance(gain, np.ndarray):
             return tuple(self._of_many(one, gain.shape) for one in context)
-        return context if not context or _plain(context) else self._context("remember()", context, state)
+        return context if _plain(context) else self._context("remember()", context, state)
 
     def values_of(self, states: np.ndarray) -> np.ndarray:
         if self._kind.values_of is Learner.values_of:
@@ -189,7 +193,7 @@ def _plain(numbers: Any) -> bool:
         total = sum(numbers)
     except Exception:  # whatever a number of somebody's library raises
         return False
-    return type(total) in (float, int) and total - total == 0
+    return type(total) in _OWN and total - total == 0
 
 
 def _array(value: Any) -> np.ndarray:

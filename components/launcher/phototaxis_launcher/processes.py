@@ -13,9 +13,8 @@ from phototaxis.errors import ComponentFailed, Unavailable, UserError
 RESTARTS = 3
 WITHIN = 20.0
 """A component that dies more than RESTARTS times within this many seconds keeps dying."""
-FINAL = {2: UserError, 3: Unavailable, 4: ComponentFailed}
-"""Exit codes by which a component says in a line why it ends; a restart would end the same."""
-PREFIX = "phototaxis: error: "
+MENDABLE = {2: UserError, 3: Unavailable, 4: ComponentFailed}
+"""Exit codes by which a component says in a line why it ends; it is not restarted, it would end the same."""
 
 
 class Child:
@@ -80,9 +79,9 @@ class Child:
         if code == 0 and self._may_leave:
             self.left = True
             return False
-        said = [line for line in self.tail(20).splitlines() if line.startswith(PREFIX)]
-        if code in FINAL and said:
-            raise FINAL[code](f"{self.name}: {said[-1].removeprefix(PREFIX)}")
+        if code in MENDABLE:
+            line = self.tail(1).removeprefix("phototaxis: error: ")
+            raise MENDABLE[code](f"{self.name}: {line}")
         self.bring_back()
         return True
 

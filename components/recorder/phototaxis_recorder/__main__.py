@@ -1,5 +1,6 @@
 """`phototaxis recorder`: the recorder as a process."""
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,6 +34,7 @@ class Options(ComponentOptions, kw_only=True):
 
 def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis recorder", "Record the run on the bus, live and on disk.")
+    os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")  # its files get their footer later
     import rerun as rr
 
     from phototaxis_recorder.server import Server
