@@ -1,6 +1,8 @@
 """The action-perception loop around a learner (section 5.1 and figure 7 of the paper)."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from operator import mul
 from typing import Any, NamedTuple
 
@@ -8,10 +10,11 @@ import msgspec
 import numpy as np
 from phototaxis.arena import Arena
 from phototaxis.checkpoint import Meta, learner_hash
-from phototaxis.errors import UserError
+from phototaxis.errors import ComponentFailed, UserError
 from phototaxis.messages import Command, End, Readings
 from phototaxis.task import ACTIONS, PERCEPTS, Memory, State, TaskOptions, lit
 
+from phototaxis_agent.checked import CheckedLearner
 from phototaxis_agent.exploration import Exploration, draw
 from phototaxis_agent.learner import Learner, Transition, find
 
@@ -69,9 +72,8 @@ class Agent:
         self.alone = True
         self.epoch = 0
         self.last = Step(0, -1, 0.0, 0.0, 0.0)
-        self._options = kind.Options() if options is None else options
+        self._options = _repeatable(learner, kind.Options() if options is None else options)
         self._rng = np.random.default_rng((seed, 0xA6E47))
-        self.learner: Learner = kind(self._options, self.percept, self._rng)
         self._reward = task.scheme()
         self._near = near
         if arena is not None:
@@ -80,6 +82,7 @@ class Agent:
         self._strides = _strides(self.percept.sizes)
         self.visits = [0] * math.prod(self.percept.sizes)
         self._run, self._tick, self._episode, self._steps = "", -1, -1, 0
+        self.learner = CheckedLearner(learner, kind, self._options, self.percept, self._rng, self._where)
         self._state: State | None = None
         self._linked = False
         self.command: Command | None = None
@@ -127,6 +130,10 @@ class Agent:
         self.command = Command(readings.run, readings.tick, self.author, left, right, end)
         return self.command
 
+    def _where(self) -> str:
+        """Which step it is, for a line about what went wrong in it."""
+        return f"tick {self._tick}, learning step {self.epoch}" if self._run else ""
+
     def _visit(self, state: State) -> int:
         """The number of a percept's state, counted as met; 0 where states are real numbers."""
         if not self.visits:
@@ -139,21 +146,32 @@ class Agent:
         """Q of every state and action, flattened row by row, 9 a row; 0 where an action is not allowed."""
         rows = np.zeros((len(self.visits), len(ACTIONS)))
         allowed = list(self.percept.actions)
-        for number, state in enumerate(np.ndindex(*self.percept.sizes)):
-            rows[number, allowed] = self.learner.values((*state, *self.learner.context))
+        with self._aside():
+            for number, state in enumerate(np.ndindex(*self.percept.sizes)):
+                rows[number, allowed] = self.learner.values((*state, *self.learner.context))
         return rows.ravel().tolist()
 
     def current(self) -> list[float]:
         """Q of the present percept for each of the 9 actions; 0 where an action is not allowed."""
         row = [0.0] * len(ACTIONS)
         if self._state is not None:
-            for action, value in zip(self.percept.actions, self.learner.values(self._state), strict=True):
-                row[action] = value
+            with self._aside():
+                values = self.learner.values(self._state)
+            for action, value in zip(self.percept.actions, values, strict=True):
+                row[action] = float(value)
         return row
+
+    @contextmanager
+    def _aside(self) -> Iterator[None]:
+        """Ask the learner something without an influence on the run: what it draws meanwhile is drawn again."""
+        drawn = self._rng.bit_generator.state
+        yield
+        self._rng.bit_generator.state = drawn
 
     def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
         """Everything needed to continue bit for bit."""
-        arrays = {**self.learner.save()}
+        with self._aside():
+            arrays = self.learner.save()
         digest, command = learner_hash(arrays), self.command
         meta = Meta(
             learner=self.name,
@@ -187,6 +205,8 @@ class Agent:
         ------
         UserError
             when the checkpoint is of another learner or percept; `source` names it.
+        ComponentFailed
+            when the learner fails to load what it saved.
         """
         for what, ours, theirs in (
             ("learner", self.name, meta.learner),
@@ -196,15 +216,17 @@ class Agent:
                 raise UserError(f"{source}: a checkpoint of the {what} '{theirs}', but '{ours}' is asked for")
         try:
             self.learner.load(arrays)
-        except (KeyError, TypeError, ValueError) as error:
+        except ValueError as error:
             raise UserError(f"{source}: does not fit the {self.name} learner: {error}") from None
+        except ComponentFailed as error:
+            raise ComponentFailed(f"{source}: {error}") from error
 
     def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
         """Continue from a checkpoint, bit for bit; in another run the percept's history does not count.
 
         Raises
         ------
-        UserError
+        UserError, ComponentFailed
             as in `take_over`.
         """
         self.take_over(meta, arrays, source)
@@ -223,6 +245,17 @@ class Agent:
     def tick(self) -> tuple[str, int]:
         """Run and tick of the last answer."""
         return self._run, self._tick
+
+
+def _repeatable(learner: str, options: Any) -> Any:
+    """The options, if a checkpoint can hold them, so that what was learned can be loaded again."""
+    try:
+        kept = msgspec.json.decode(msgspec.json.encode(options), type=type(options))
+    except (msgspec.MsgspecError, TypeError, ValueError) as error:
+        raise UserError(f"learner {learner}: {options} cannot be kept in a checkpoint: {error}") from None
+    if kept != options:
+        raise UserError(f"learner {learner}: {options} would be {kept} when read from a checkpoint")
+    return options
 
 
 def _strides(sizes: tuple[int, ...]) -> list[int]:

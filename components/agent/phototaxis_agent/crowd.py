@@ -12,7 +12,8 @@ class CrowdAgent:
     """Drives N robots through one episode each, all of which begin at the same tick."""
 
     def __init__(self, agent: Agent, near: float, count: int, seed: int):
-        self._learner, self._percept, self._near = agent.learner, agent.percept, near
+        self._learner = agent.learner.seen_from(lambda: f"step {self._step} of an evaluation")
+        self._percept, self._near, self._step = agent.percept, near, 0
         self._temperature = agent.exploration.cold
         self._rng = np.random.default_rng(seed)
         self._memory = Memory()
@@ -27,12 +28,13 @@ class CrowdAgent:
         if self._state is not None:
             left, right = memory.before
             gain = np.maximum(*readings.light) - np.maximum(left, right)
-            remembered = self._learner.remember(tuple(self._state.T), self._action, gain)
+            remembered = self._learner.remember(tuple(self._state.T.copy()), self._action.copy(), gain)
             self._context = columns(remembered, count)
         percept = columns(self._percept.state(readings, memory, self._near), count)
         self._state = np.concatenate([percept, self._context], axis=1)
         choice = draw_many(self._learner.values_of(self._state), self._temperature, self._rng.random(count))
         self._action = np.array(self._percept.actions)[choice]
+        self._step += 1
         return _MOTORS[self._action]
 
 

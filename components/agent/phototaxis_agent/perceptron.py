@@ -12,8 +12,6 @@ from msgspec import Meta, Struct
 
 from phototaxis_agent.learner import stored
 
-torch.set_num_threads(1)  # nets of this size only lose by more; and one thread always adds in one order
-
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
     """Of a net and of what it learns."""

@@ -29,6 +29,7 @@ from phototaxis.protocol import Once
 
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.many import Flock
+from phototaxis_agent.stuck import watched
 
 TABLE_EVERY = 0.5
 SAVE_EVERY = 10.0
@@ -96,12 +97,13 @@ class Server:
 
     def serve(self) -> None:
         """Drive, or wait for the seat, until a "stop" event or until a successor drives; leave the seat and save."""
-        while not self._replaced and self._handle(self._bus.receive(timeout=0.05)):
-            pass
+        with watched():
+            while not self._replaced and self._handle(self._bus.receive(timeout=0.05)):
+                pass
         self._log.flush()
         if self._session is not None:
             self._bus.control(Control("release", self._bus.ident), timeout=0.5)
-            self._save(self._session.agent)
+            self._save(self._session.agent, last=True)
 
     def _handle(self, event: Event | None) -> bool:
         """Do what one event asks for; False when it is to stop."""
@@ -218,7 +220,7 @@ class Server:
         if command is None:
             return
         if 0 < session.world.epochs <= readings.epoch:
-            self._save(agent)  # before the last answer: who sees the run finished finds the checkpoint
+            self._save(agent, last=True)  # before the last answer: who sees the run finished finds the checkpoint
         self._bus.put("command" if isinstance(readings, Readings) else "crowd/command", command)
         if fresh:
             self._record(agent)
@@ -282,10 +284,13 @@ class Server:
                 session.answer(readings)
                 self._record(session.agent)
 
-    def _save(self, agent: Agent) -> None:
+    def _save(self, agent: Agent, last: bool = False) -> None:
         if self._path is None or agent.tick == self._saved:
             return
-        save(self._path, *agent.checkpoint())
+        meta, arrays = agent.checkpoint()
+        if last:
+            agent.learner.prove(arrays)
+        save(self._path, meta, arrays)
         self._saved = agent.tick
         if self._journal is not None:
             self._journal.begin(agent.tick[0].encode())

@@ -59,10 +59,11 @@ class Bus:
         self._decoders: dict[str, Decoder[Any]] = {}
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._declared: list[Any] = []
+        self._at_times: dict[str, zenoh.Subscriber] = {}
         reads = ROLES[role].reads
         for topic in TOPICS.values():
             if topic.name in reads:
-                self._subscribe(topic)
+                self._declared.append(self._subscribe(topic))
             if topic.writer == role:
                 self._offer(topic)
         watch = self._callback("token")
@@ -72,6 +73,13 @@ class Bus:
     def put(self, topic: str, message: Message | bytes) -> None:
         """Publish one message (or one that is encoded already)."""
         self._publishers[topic].put(message if isinstance(message, bytes) else encode(message))
+
+    def listen(self, topic: str, wanted: bool) -> None:
+        """Receive one of the topics that this role reads at times, or receive it no more."""
+        if wanted and topic not in self._at_times:
+            self._at_times[topic] = self._subscribe(TOPICS[topic])
+        elif not wanted and topic in self._at_times:
+            self._at_times.pop(topic).undeclare()
 
     def receive(self, timeout: float | None = None) -> Event | None:
         """The next event; None when `timeout` seconds brought nothing, or something that was refused."""
@@ -163,7 +171,7 @@ class Bus:
 
     def close(self) -> None:
         """Take back what was declared, the token last."""
-        for declared in self._declared:
+        for declared in [*self._at_times.values(), *self._declared]:
             declared.undeclare()
         for publisher in self._publishers.values():
             publisher.undeclare()
@@ -174,10 +182,9 @@ class Bus:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _subscribe(self, topic: Topic) -> None:
+    def _subscribe(self, topic: Topic) -> zenoh.Subscriber:
         self._decoders[topic.name] = Decoder(topic.message, topic.limit)
-        key = topic.key(self.name)
-        self._declared.append(self._session.declare_subscriber(key, self._callback(topic.name)))
+        return self._session.declare_subscriber(topic.key(self.name), self._callback(topic.name))
 
     def _offer(self, topic: Topic) -> None:
         key = topic.key(self.name)

@@ -24,6 +24,10 @@ FORMAT = 2
 OLDEST = 1
 """The oldest format that is read; it lacks `arena_digest`."""
 _LIMIT = 1_000_000_000
+_SPARE = 1_000_000
+"""Bytes of a file that are not the arrays' own."""
+NUMBERS = "biufcSU"
+"""NumPy's kinds of numbers, and of text, that are read back without pickles."""
 
 
 class Meta(Struct, forbid_unknown_fields=True, kw_only=True):
@@ -86,11 +90,45 @@ def learner_hash(arrays: dict[str, np.ndarray]) -> str:
     return digest.hexdigest()
 
 
+def storable(arrays: dict[Any, np.ndarray]) -> dict[str, np.ndarray]:
+    """The arrays, if a checkpoint can hold them and give them back.
+
+    Raises
+    ------
+    UserError
+        when a name or a type of number cannot be read back, or all are too large; the text says which.
+    """
+    for name, array in arrays.items():
+        if not isinstance(name, str) or not name.isprintable() or name in ("", "meta") or name.endswith(".npy"):
+            raise UserError(f"no array of a checkpoint may be called {name!r}; take a word that says what it holds")
+        if array.dtype.kind not in NUMBERS:
+            held = "Python objects" if array.dtype.hasobject else f"the type {array.dtype}"
+            raise UserError(f"the array '{name}' holds {held}, which cannot be read back; give numbers")
+    total = sum(array.nbytes for array in arrays.values())
+    if total > _LIMIT - _SPARE:
+        raise UserError(f"the arrays have {total} bytes, which is too much: at most {_LIMIT - _SPARE} are read back")
+    return arrays
+
+
 def encode(meta: Meta, arrays: dict[str, np.ndarray]) -> bytes:
-    """A checkpoint as the bytes of a file."""
+    """A checkpoint as the bytes of a file.
+
+    Raises
+    ------
+    UserError
+        when `decode` could not read it.
+    """
+    text = msgspec.json.encode(meta)
+    try:
+        msgspec.json.decode(text, type=Meta)
+    except msgspec.MsgspecError as error:  # numbers that are not finite are null in JSON
+        raise UserError(f"cannot be kept in a checkpoint: {error}") from None
+    named = {"meta": np.frombuffer(text, np.uint8), **storable(arrays)}
     buffer = io.BytesIO()
-    named: dict[str, Any] = {"meta": np.frombuffer(msgspec.json.encode(meta), np.uint8), **arrays}
-    np.savez(buffer, **named)
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, array in named.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
     return buffer.getvalue()
 
 

@@ -15,7 +15,7 @@ import msgspec
 from msgspec import Meta
 
 from phototaxis.bus import Bus
-from phototaxis.errors import one_line
+from phototaxis.errors import leave, one_line
 from phototaxis.session import BusOptions, open_session, reaching
 
 
@@ -87,4 +87,4 @@ def entry(body: Callable[[], None]) -> None:
         body()
         return 0
 
-    sys.exit(one_line(main))
+    leave(one_line(main))

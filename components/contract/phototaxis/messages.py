@@ -233,6 +233,12 @@ class Status(Message):
     """Who will or would drive next: takers-over by their tick, then standbys."""
     alive: list[str] = field(default_factory=list)
     """"role/id" of every component whose token is on the bus."""
+    late: Count = 0
+    """Ticks that ended by the clock before their command came, in real time (of this simulation process)."""
+    late_sensors: Count = 0
+    """In how many of them the readings had not come either: the sensors were too slow, not the agent."""
+    too_slow: str = ""
+    """Which part cannot keep up with the speed now, in words; "" when all can."""
     refused: dict[str, int] = field(default_factory=dict)
     """Messages refused or ignored by the simulation, by reason."""
     hash: str = ""
@@ -338,6 +344,8 @@ class SimLog(Message):
     contact: list[int]
     """0 none, 1 front, 2 rear, 3 both."""
     ended: list[Episode]
+    late: Count = 0
+    """Ticks so far that ended by the clock before their command came, as in the status."""
 
     def __post_init__(self) -> None:
         _check_columns(self, episode=1, time=1, x=1, y=1, heading=1, left=1, right=1, contact=1)

@@ -27,7 +27,7 @@ class Rights(NamedTuple):
 def rights(role: str) -> Rights:
     """What a role may do."""
     own = [topic for topic in TOPICS.values() if topic.writer == role]
-    read = ROLES[role].reads
+    read = *ROLES[role].reads, *ROLES[role].at_times
     return Rights(
         writes=[topic.name for topic in own if topic.kind in ("stream", "log")],
         reads=list(read),

@@ -87,10 +87,12 @@ class Role(NamedTuple):
     listens: bool = True
     asks: tuple[str, ...] = ()
     """Queries that it sends (of what it reads it may ask, too)."""
+    at_times: tuple[str, ...] = ()
+    """What it also reads, but only while it needs it."""
 
 
 ROLES = {
-    "sim": Role(reads=("command", "crowd/command"), dials=()),
+    "sim": Role(reads=("command", "crowd/command"), dials=(), at_times=("readings", "crowd/readings")),
     "sensors": Role(reads=("state", "crowd/state"), dials=("sim",), asks=("world", "log/sim")),
     "recorder": Role(reads=("log/sim", "log/sensors", "log/agent"), dials=("sim", "sensors"), asks=("world",)),
     "agent": Role(

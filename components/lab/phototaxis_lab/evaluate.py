@@ -37,6 +37,7 @@ def main(argv: Sequence[str]) -> int:
     groups = {"": Options, "sensor models": FmuOptions}
     options, fmus = parse_groups(groups, argv, "phototaxis evaluate", about, positional=["checkpoint"])
     from phototaxis_agent.setup import from_checkpoint
+    from phototaxis_agent.stuck import watched
     from phototaxis_sensors.choice import choose
 
     from phototaxis_lab.measure import SEED_OFFSET, describe, evaluate
@@ -47,7 +48,7 @@ def main(argv: Sequence[str]) -> int:
     setup = from_checkpoint(meta, str(path))
     agent = setup.agent(World("evaluation", arena, options.seed + SEED_OFFSET, 0), learning=False)
     agent.take_over(meta, arrays, str(path))
-    with choose(fmus) as sensors:
+    with watched(), choose(fmus) as sensors:
         found = evaluate(arena, agent, options.placements, options.seed, options.cap, sensors)
     place = {
         "arena": options.arena or arena.name,

@@ -5,7 +5,8 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import joblib
-from phototaxis.errors import Unavailable
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+from phototaxis.errors import ComponentFailed, Unavailable
 
 from phototaxis_lab.cell import Cell, Outcome, run
 
@@ -17,10 +18,22 @@ def outcomes(cells: Sequence[Cell], jobs: int = -1) -> Iterator[tuple[int, Outco
     """The outcome of each cell with its index, as they come. Longest first, so that no core is left alone at the end.
 
     `jobs` processes at a time, −1 for as many as there are cores; within `cluster`, what the cluster has.
+
+    Raises
+    ------
+    ComponentFailed
+        when a process dies.
     """
     order = sorted(range(len(cells)), key=lambda index: -cells[index].epochs)
     work: Any = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
-    yield from work(joblib.delayed(_numbered)(index, cells[index]) for index in order)
+    try:
+        yield from work(joblib.delayed(_numbered)(index, cells[index]) for index in order)
+    except TerminatedWorkerError:
+        learners = ", ".join(sorted({cell.system.learner for cell in cells}))
+        line = (
+            "a process that computes cells ended without a word: its learner ended it, crashed, or took too much memory"
+        )
+        raise ComponentFailed(f"{line} (learners: {learners})") from None
 
 
 def _numbered(index: int, cell: Cell) -> tuple[int, Outcome]:

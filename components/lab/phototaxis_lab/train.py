@@ -58,11 +58,15 @@ def main(argv: Sequence[str]) -> int:
 
 def one(options: Options, setup: Any, arena: Any, make: Any) -> dict[str, Any]:
     """One seed: hashes, rate and, if wanted, the checkpoint."""
+    from phototaxis_agent.stuck import watched
+
     from phototaxis_lab.loop import train
 
-    loop, seconds = train(setup, arena, options.seed, options.epochs, make)
-    meta, arrays = loop.agent.checkpoint()
+    with watched():
+        loop, seconds = train(setup, arena, options.seed, options.epochs, make)
+        meta, arrays = loop.agent.checkpoint()
     if options.checkpoint:
+        loop.agent.learner.prove(arrays)
         save(Path(options.checkpoint), meta, arrays)
     simulation = loop.simulation
     found = {

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import NamedTuple
 
 from phototaxis import __version__
-from phototaxis.errors import UserError, one_line
+from phototaxis.errors import UserError, leave, one_line
 
 
 class Verb(NamedTuple):
@@ -49,7 +49,7 @@ VERBS = {
 
 def main() -> None:
     """Entry point of the `phototaxis` command."""
-    sys.exit(one_line(lambda: dispatch(sys.argv[1:])))
+    leave(one_line(lambda: dispatch(sys.argv[1:])))
 
 
 def dispatch(words: list[str]) -> int:

@@ -1,5 +1,6 @@
 """Child processes: started, watched, restarted when they die, and always ended."""
 
+import os
 import subprocess
 import sys
 import time
@@ -12,8 +13,8 @@ from phototaxis.errors import WARNING, ComponentFailed, Unavailable, UserError
 RESTARTS = 3
 WITHIN = 20.0
 """A component that dies more than RESTARTS times within this many seconds keeps dying."""
-MENDABLE = {2: UserError, 3: Unavailable}
-"""Exit codes by which a component says that the user can mend it; it is not restarted."""
+MENDABLE = {2: UserError, 3: Unavailable, 4: ComponentFailed}
+"""Exit codes by which a component says in a line why it ends; it is not restarted, it would end the same."""
 
 
 class Child:
@@ -59,6 +60,7 @@ class Child:
                 stdout=log,
                 stderr=log,
                 start_new_session=True,
+                env=os.environ | {"PYTHONFAULTHANDLER": "1"},  # where a crash happened, in the log
             )
 
     def watch(self) -> bool:
@@ -66,10 +68,10 @@ class Child:
 
         Raises
         ------
-        UserError, Unavailable
-            when it ended with a line that the user can act on.
+        UserError, Unavailable, ComponentFailed
+            when it ended with a line that says why.
         ComponentFailed
-            when it keeps dying; the text ends with its stderr.
+            also when it keeps dying; the text ends with its stderr.
         """
         if self.process is None or self.process.poll() is None:
             return False
@@ -80,15 +82,30 @@ class Child:
         if code in MENDABLE:
             line = self.tail(1).removeprefix("phototaxis: error: ")
             raise MENDABLE[code](f"{self.name}: {line}")
+        self.bring_back()
+        return True
+
+    def bring_back(self) -> None:
+        """Start it again after it has ended though it should not.
+
+        Raises
+        ------
+        ComponentFailed
+            when it keeps dying; the text ends with its stderr.
+        """
+        if self.process is None:
+            return
         self._deaths.append(time.monotonic())
         if len(self._deaths) > RESTARTS and self._deaths[-1] - self._deaths[0] < WITHIN:
+            who = f"{self.name} (learner {self.label})" if self.label else self.name
+            words = self.last_words()
             raise ComponentFailed(
-                f"{self.name} died {len(self._deaths)} times, last with {_meaning(code)}; "
-                f"its last words:\n{self.tail(20)}"
+                f"{who} died {len(self._deaths)} times, last with {_meaning(self.process.returncode)}; "
+                + (f"its last words:\n{words}" if words else "it said nothing")
             )
+        self.left = False
         self.restarts += 1
         self.start("--restarted")
-        return True
 
     def stop(self, patience: float) -> None:
         """Ask the process to end, and end it when it does not within `patience` seconds."""
@@ -121,6 +138,11 @@ class Child:
         lines = whole.decode(errors="replace").splitlines()
         return [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
 
+    def last_words(self) -> str:
+        """What it wrote before it died; of a crash in compiled code, where that was."""
+        fatal = self.tail(100).rpartition("Fatal Python error")
+        return "\n".join((fatal[1] + fatal[2]).splitlines()[:6]) if fatal[1] else self.tail(20)
+
     def tail(self, lines: int) -> str:
         """The last lines it wrote."""
         try:
@@ -130,4 +152,4 @@ class Child:
 
 
 def _meaning(code: int) -> str:
-    return f"signal {-code}" if code < 0 else f"exit code {code}"
+    return f"signal {-code}" if code < 0 else f"exit code {code}" if code else "exit code 0, before its time"

@@ -28,6 +28,8 @@ PORT = Annotated[int, Meta(ge=-1, le=65535)]
 PATIENCE = {"recorder": 60.0, "agent": 15.0, "sensors": 5.0, "sim": 5.0}
 """Seconds that a component gets to end; also the order in which they are ended."""
 SWAPS = re.compile(r"(?P<tick>[0-9]+):(?P<learner>[^:,\s]+)")
+SILENT = 5.0
+"""Seconds after which a driver that is there but does not answer is named."""
 STARTING = 60.0
 """Seconds within which all components must be on the bus."""
 
@@ -64,7 +66,9 @@ class Run:
     """One run of the system."""
 
     def __init__(self, options: UpOptions, fmus: FmuOptions, agent_words: list[str]):
-        self._options, self._words = options, agent_words
+        self._options, self._words, self._fmus = options, agent_words, fmus
+        self._complained = False
+        self._drove: set[str] = set()
         swaps = swap_plan(options.swap)
         self.folder = run_folder(Path(options.out))
         self.name = self.folder.name
@@ -148,7 +152,9 @@ class Run:
                         status = event.message
                         progress.show(status)
                         self._report(status, progress)
+                        self._complain(status, progress)
                         self._confirm(status)
+                        self._miss(status, progress)
                     if self.children["agent"].process is None:
                         self._start_agent(status, deadline, progress)
             finally:
@@ -195,6 +201,16 @@ class Run:
                 if seating.driver in child.idents:
                     self._answer(child, LaunchReply(agent=seating.driver, tick=seating.tick))
 
+    def _miss(self, status: Status, progress: Progress) -> None:
+        """Bring back an agent that ended without a word, though nobody has taken the seat over from it."""
+        self._drove |= {one.driver for one in status.drivers}
+        last = status.drivers[-1].driver if status.drivers else ""
+        for agent in self.agents:
+            drove = self._drove & {*agent.idents}
+            if agent.left and status.phase != "finished" and not status.driver and (last in drove or not drove):
+                agent.bring_back()
+                progress.say(f"{agent.name} ended before its time and was restarted; see {self.folder}")
+
     def _answer(self, child: Child, reply: LaunchReply) -> bool:
         """Answer who asked for this agent; whether somebody had."""
         asked = [event for one, event in self._pending if one is child]
@@ -210,6 +226,18 @@ class Run:
         if alive != self._alive:
             self._alive = alive
             progress.say(f"alive: {', '.join(alive)}")
+
+    def _complain(self, status: Status, progress: Progress) -> None:
+        """Say which part is too slow, or silent, when that begins."""
+        complaint = ""
+        if status.too_slow:
+            complaint = f"at {status.speed:g} × real time {status.too_slow}; then the motors stop: lower the speed"
+        elif status.phase == "waiting" and status.driver and status.waited > SILENT:
+            complaint = f"{status.driver} is there, but does not answer tick {status.tick}; see {self.folder}"
+        if complaint and not self._complained:
+            fmus = [fmu for fmu in (self._fmus.light_fmu, self._fmus.sonar_fmu) if fmu]
+            progress.say(complaint + (f" (the sensors use {' and '.join(fmus)})" if fmus else ""))
+        self._complained = bool(complaint)
 
     def _start_agent(self, status: Status, deadline: float, progress: Progress) -> None:
         present = {who.split("/")[0] for who in status.alive}
@@ -261,6 +289,8 @@ class Run:
             "recording": str(recordings[-1]) if recordings else None,
             "checkpoint": str(self.checkpoint) if meta else None,
             "restarts": {child.name: child.restarts for child in self._all() if child.restarts},
+            "late_ticks": status.late,
+            "late_sensors": status.late_sensors,
             "refused": status.refused,
         }
 
@@ -303,6 +333,12 @@ def main(argv: Sequence[str]) -> int:
         print(json.dumps(result), flush=True)
     else:
         summarise(result)
+    if status.late and status.late == status.tick:
+        part = "sensors" if 2 * status.late_sensors > status.late else "agent"
+        line = (
+            f"none of {status.late} ticks had a command in time: the {part} cannot keep up with {status.speed:g} × real"
+        )
+        raise ComponentFailed(f"{line} time, and the robot never moved; lower --speed (0: as fast as it goes)")
     return 0
 
 
@@ -311,6 +347,7 @@ def summarise(result: dict[str, object]) -> None:
     lines = [
         f"{result['epochs']} epochs, {result['episodes']} episodes, {result['reached']} of them reached the light; "
         f"{result['ticks_per_second']} ticks/s",
+        *([f"late        {result['late_ticks']} ticks without a command in time"] if result["late_ticks"] else []),
         f"recording   {result['recording']}",
         f"checkpoint  {result['checkpoint']}",
     ]

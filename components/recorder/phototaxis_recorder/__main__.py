@@ -1,5 +1,6 @@
 """`phototaxis recorder`: the recorder as a process."""
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,6 +39,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         raise UserError(
             f"--bind {options.bind}: others could watch, and nothing guards that; use 127.0.0.1, or add --insecure"
         )
+    os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")  # its files get their footer later
     import rerun as rr
 
     from phototaxis_recorder.server import Server

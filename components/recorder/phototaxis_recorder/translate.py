@@ -41,6 +41,7 @@ class Translator:
         self._episode = -1
         self._recent: deque[bool] = deque(maxlen=50)
         self._driver = ""
+        self._late = 0
         self._models = {"sonar": "", "light": ""}
         self._rewards: deque[float] = deque(maxlen=MEAN)
         self.summary = Summary(world.run, world.arena.name, world.arena.digest)
@@ -56,6 +57,9 @@ class Translator:
             self._text(chunk.tick[0], f"{self._driver or 'nobody'} drives")
             label = rr.Points2D([(0, 0)], labels=[self._driver], colors=BLUE, radii=0.02, show_labels=True)
             rr.log("world/robot/driver", label, recording=self._recording)
+        if chunk.late and chunk.late >= 2 * self._late:  # a few lines, however many there are
+            self._late = chunk.late
+            self._text(chunk.tick[0], f"{chunk.late} ticks without a command in time so far", rr.TextLogLevel.WARN)
         self._episodes += [episode for episode in chunk.ended if episode.episode > self._episode]
         if self._episodes:
             self._episode = self._episodes[-1].episode

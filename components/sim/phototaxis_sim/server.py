@@ -16,6 +16,7 @@ from phototaxis.journal import Journal
 from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, Phase, SimLog, State, Status
 from phototaxis.protocol import Question
 
+from phototaxis_sim.lateness import Lateness
 from phototaxis_sim.many import SimulationOfMany
 from phototaxis_sim.pace import Pace
 from phototaxis_sim.seat import Seat
@@ -72,12 +73,16 @@ class Server:
         self._ended: list[Any] = []
         self._log = Chunks(bus, "log/sim", self._chunk)
         self._seat = Seat()
+        self._lateness, self._told = Lateness(), ""
+        self._sensed: int | None = None
+        """The newest tick whose readings came, as far as they are listened to; None until there are any."""
         if journal is not None:
             self._seat.heir = self._continue(journal)
         self._heir_until = time.monotonic() + HEIR_WITHIN
 
     def serve(self) -> None:
         """Run until a "stop" event or request."""
+        self._pace_set()
         self._ask()
         while not self._stopping:
             event = self._bus.receive(timeout=self._timeout())
@@ -105,6 +110,8 @@ class Server:
     def _handle(self, event: Event) -> None:
         if event.topic == f"{self._prefix}command":
             self._command(event.message)
+        elif event.topic == f"{self._prefix}readings":
+            self._sensed = event.message.tick if event.message.run == self._sim.state.run else self._sensed
         elif event.topic == "control":
             self._control(event)
         elif event.topic == "world" and event.reply:
@@ -176,8 +183,10 @@ class Server:
         """In real time: the newest command holds until it is stale, then the motors stop."""
         state = self._sim.state
         if self._held is not None:
+            self._lateness.in_time()
             self._answered()
         elif self._seat.driver and not self._sim.finished:
+            self._lateness.late(self._sensed is None or self._sensed >= state.tick)
             motors = (0.0, 0.0, "") if self._pace.stale(now) else (state.left, state.right, state.author)
             self._apply(Entry(*motors, ""))
         self._pace.begun(now)
@@ -237,6 +246,7 @@ class Server:
             self._answered()
         elif verb == "speed":
             self._pace.set(request.speed, now)
+            self._pace_set()
         elif verb == "reset":
             if self._finished or self._sim.finished:
                 return "the run is finished"
@@ -247,11 +257,21 @@ class Server:
             self._bus.stop()
         return ""
 
+    def _pace_set(self) -> None:
+        """In real time the readings are listened to, to know whether sensors or agent are too slow."""
+        self._bus.listen(f"{self._prefix}readings", self._pace.realtime)
+
+    def _too_slow(self) -> str:
+        """Which part cannot keep up with the speed, in words."""
+        sensors = next((who.split("/")[1] for who in sorted(self._alive) if who.startswith("sensors/")), "the sensors")
+        return self._lateness.told(self._seat.driver or "the agent", sensors) if self._pace.realtime else ""
+
     def _begin(self, seed: int) -> None:
         """A new run in the same arena; its name says from which it comes, for the journal."""
         self._log.flush()
         self._sim = self._sim.anew(seed, f"{self._root}.{secrets.token_hex(2)}")
         self._held, self._started, self._finished = None, None, False
+        self._lateness, self._sensed = Lateness(), None
         self._recent.clear()
         self._ended.clear()
         self._rate_at = self._rate = self._mean_rate = 0.0
@@ -299,6 +319,7 @@ class Server:
             recent=sum(self._recent) / len(self._recent) if self._recent else 0.0,
             rate=self._rate, mean_rate=self._mean_rate, driver=self._seat.driver, drivers=self._seat.history,
             next=self._seat.waiting, alive=sorted(self._alive),
+            late=self._lateness.ticks, late_sensors=self._lateness.unsensed, too_slow=self._too_slow(),
             refused=dict(self._bus.refused), hash=state.hash,
         )  # fmt: skip
 
@@ -310,7 +331,11 @@ class Server:
         if self._started and not self._finished:
             since, tick = self._started
             self._mean_rate = (self._sim.state.tick - tick) / max(now - since, 1e-9)
-        self._bus.put("status", self._status(now))
+        status = self._status(now)
+        if status.too_slow and not self._told:
+            print(f"sim: at {status.speed:g} × real time {status.too_slow}", file=sys.stderr, flush=True)
+        self._told = status.too_slow
+        self._bus.put("status", status)
 
     def _record(self, s: State) -> None:
         if s.driver != self._logged:  # a chunk has one driver
@@ -325,7 +350,7 @@ class Server:
         tick, episode, seconds, x, y, heading, left, right, contact = columns
         return SimLog(
             self._sim.world.run, seq, self._bus.ident, self._logged,
-            tick, episode, seconds, x, y, heading, left, right, contact, ended,
+            tick, episode, seconds, x, y, heading, left, right, contact, ended, self._lateness.ticks,
         )  # fmt: skip
 
     def _header(self) -> bytes:

@@ -9,6 +9,7 @@ from phototaxis.task import ACTIONS, Percept, State
 from phototaxis_agent.inputs import Scaled
 from phototaxis_agent.learner import Learner, Transition
 from phototaxis_agent.perceptron import PRESETS, Hyperparameters, Perceptron
+from phototaxis_agent.threads import one_thread
 
 REWARDS = (-2.0, 0.0, 2.0, 3.0)
 MAPPED = (0.0, 0.5, 0.75, 1.0)
@@ -37,6 +38,7 @@ class Ann(Learner):
             None
         ]
 
+    @one_thread
     def values_of(self, states: np.ndarray) -> np.ndarray:
         count, actions = len(states), len(self._allowed)
         pairs = self._pairs(np.repeat(states, actions, axis=0), np.tile(self._allowed, (count, 1)))
@@ -45,6 +47,7 @@ class Ann(Learner):
     def values(self, state: State) -> list[float]:
         return self.values_of(np.array([state], dtype=float))[0].tolist()
 
+    @one_thread
     def learn(self, transition: Transition) -> float:
         """Equation 1 makes the target, back-propagation moves the net's output towards it."""
         state, action, reward, following, terminated, *_ = transition

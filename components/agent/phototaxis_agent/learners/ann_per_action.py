@@ -10,6 +10,7 @@ from phototaxis_agent.inputs import Scaled
 from phototaxis_agent.learner import Learner, Transition
 from phototaxis_agent.learners.ann import MAPPED, REWARDS
 from phototaxis_agent.perceptron import PRESETS, Hyperparameters, Perceptron
+from phototaxis_agent.threads import one_thread
 
 
 class AnnPerAction(Learner):
@@ -26,12 +27,14 @@ class AnnPerAction(Learner):
         """Hidden units of all nets, (actions, N, hidden)."""
         return self._net.hidden(torch.from_numpy(self._scaled(states)).expand(len(ACTIONS), -1, -1))
 
+    @one_thread
     def values_of(self, states: np.ndarray) -> np.ndarray:
         return self._net.output(self._hidden(states)).numpy()[self._allowed].T
 
     def values(self, state: State) -> list[float]:
         return self.values_of(np.array([state], dtype=float))[0].tolist()
 
+    @one_thread
     def learn(self, transition: Transition) -> float:
         """As `Ann`, with the net of the action."""
         state, action, reward, following, terminated, *_ = transition

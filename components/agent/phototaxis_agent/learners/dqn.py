@@ -10,8 +10,7 @@ from phototaxis.task import ACTIONS, MIRRORED, Percept, State
 from phototaxis_agent import context
 from phototaxis_agent.inputs import OneHot
 from phototaxis_agent.learner import Learner, Transition, falling, stored
-
-torch.set_num_threads(1)  # the nets are too small for more, and one thread always adds in one order
+from phototaxis_agent.threads import one_thread
 
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
@@ -71,6 +70,7 @@ class Dqn(Learner):
     def remember(self, state: Any, action: Any, gain: Any) -> tuple[Any, ...]:
         return context.remember(action, gain)
 
+    @one_thread
     def values_of(self, states: np.ndarray) -> np.ndarray:
         with torch.no_grad():
             return self._net(self._encode(states)).numpy()[:, self._allowed]
@@ -78,6 +78,7 @@ class Dqn(Learner):
     def values(self, state: State) -> list[float]:
         return self.values_of(np.array([state], dtype=float))[0].tolist()
 
+    @one_thread
     def learn(self, transition: Transition) -> float:
         state, action, reward, following, terminated, progress, _ = transition
         mirror, percept = context.mirror, self._percept
@@ -144,8 +145,12 @@ class Dqn(Learner):
 
 
 def _network(inputs: int, hidden: int, rng: np.random.Generator) -> torch.nn.Sequential:
-    """One hidden layer; first weights uniform in ± 1/√inputs of their layer, as is PyTorch's custom."""
-    layers = torch.nn.Linear(inputs, hidden), torch.nn.Linear(hidden, len(ACTIONS))
+    """One hidden layer; first weights uniform in ± 1/√inputs of their layer, as is PyTorch's custom.
+
+    They come from `rng` alone: PyTorch's own generator is the process's.
+    """
+    sizes = (inputs, hidden), (hidden, len(ACTIONS))
+    layers = [torch.nn.utils.skip_init(torch.nn.Linear, *size) for size in sizes]
     with torch.no_grad():
         for layer in layers:
             for parameter in layer.parameters():

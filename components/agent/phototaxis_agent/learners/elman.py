@@ -7,6 +7,7 @@ from phototaxis.task import Percept
 
 from phototaxis_agent.learners.ann import Ann
 from phototaxis_agent.perceptron import Hyperparameters
+from phototaxis_agent.threads import one_thread
 
 
 class Elman(Ann):
@@ -21,6 +22,7 @@ class Elman(Ann):
         self.context = (0.5,) * options.hidden
         super().__init__(options, percept, rng)
 
+    @one_thread
     def remember(self, state: Any, action: Any, gain: Any) -> tuple[Any, ...]:
         states = np.array(state, dtype=float).reshape(len(state), -1).T
         motors = self._motors[np.maximum(np.atleast_1d(action), 0)]  # none of the nine counts as standing still

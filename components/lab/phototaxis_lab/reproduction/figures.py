@@ -37,6 +37,7 @@ Runs = Mapping[int, Sequence[Outcome]]
 """The outcomes of one system's seeds, by the number of epochs."""
 
 
+@mpl.rc_context(STYLE)
 def success(path: Path, systems: Mapping[str, Runs], lines: Mapping[str, float], against: str = "epochs") -> None:
     """Mean success of each system with its 95% interval, against epochs or ended episodes (figures 10 and 12).
 
@@ -67,6 +68,7 @@ def success(path: Path, systems: Mapping[str, Runs], lines: Mapping[str, float],
     _save(figure, path)
 
 
+@mpl.rc_context(STYLE)
 def accumulated_reward(path: Path, systems: Mapping[str, Sequence[Outcome]], epochs: int) -> None:
     """Accumulated reward over time: each seed thin, the mean bold (figure 11)."""
     figure, all_axes = _figure(6.4, 3.0, columns=len(systems))
@@ -82,6 +84,7 @@ def accumulated_reward(path: Path, systems: Mapping[str, Sequence[Outcome]], epo
     _save(figure, path)
 
 
+@mpl.rc_context(STYLE)
 def time_in_states(path: Path, shares: np.ndarray, names: Sequence[str]) -> None:
     """Share of the learning steps spent in each state: mean over seeds and its 95% interval (figure 13).
 
@@ -99,6 +102,7 @@ def time_in_states(path: Path, shares: np.ndarray, names: Sequence[str]) -> None
     _save(figure, path)
 
 
+@mpl.rc_context(STYLE)
 def table(path: Path, values: np.ndarray, names: Sequence[str]) -> None:
     """The learned Q-table, states by actions, the best action of each state marked (figure 6)."""
     figure, axes = _figure(4.6, 5.4)
@@ -115,7 +119,6 @@ def table(path: Path, values: np.ndarray, names: Sequence[str]) -> None:
 
 
 def _figure(width: float, height: float, columns: int = 1) -> tuple[Figure, Any]:
-    mpl.rcParams.update(STYLE)
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.subplots(1, columns)
 
