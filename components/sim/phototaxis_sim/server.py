@@ -11,9 +11,12 @@ import msgspec
 from phototaxis.bus import Bus, Event
 from phototaxis.chunks import Chunks
 from phototaxis.codec import Refused
-from phototaxis.journal import Journal
-from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, Phase, SimLog, State, Status
+from phototaxis.disk import unwritten
+from phototaxis.errors import Unavailable, UserError
+from phototaxis.journal import GIVEN_UP, Journal
+from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, Phase, Recorded, SimLog, State, Status
 from phototaxis.protocol import Question
+from phototaxis.stderr import warn
 
 from phototaxis_sim.many import SimulationOfMany
 from phototaxis_sim.pace import Pace
@@ -40,8 +43,16 @@ class Server:
     """Drives a `Simulation` by the answers that come from the bus.
 
     With a journal that holds the same run, it continues where that run was killed: the episode's start
-    is restored and its commands are made again. A driver that is there but has not answered for `patience`
-    seconds loses the seat if somebody else waits for it.
+    is restored and its commands are made again. A journal that cannot be written is given up until the next
+    episode; the run goes on, and the status warns that it could not be continued. A driver that is there but
+    has not answered for `patience` seconds loses the seat if somebody else waits for it.
+
+    Raises
+    ------
+    UserError
+        when the journal is not one of a simulation.
+    Unavailable
+        when it cannot be begun, or was given up before the simulation died.
     """
 
     def __init__(
@@ -69,6 +80,10 @@ class Server:
         self._started: tuple[float, int] | None = None
         self._mean_rate = 0.0
         self._ended: list[Any] = []
+        self._unkept = ""
+        """Why the journal is given up."""
+        self._warned = False
+        self._recorded: Recorded | None = None
         self._log = Chunks(bus, "log/sim", self._chunk)
         self._seat = Seat()
         if journal is not None:
@@ -110,6 +125,8 @@ class Server:
             event.reply(self._sim.world)
         elif event.topic == "log/sim":
             self._log.answer(event)
+        elif event.topic == "recording":
+            self._recorded = event.message
         elif event.topic == "alive":
             self._alive.add("/".join(event.message))
         elif event.topic == "gone":
@@ -182,12 +199,12 @@ class Server:
         self._pace.begun(now)
 
     def _apply(self, entry: Entry) -> None:
-        if self._journal is not None and not entry.end:
-            self._journal.append(msgspec.msgpack.encode(entry))
+        if not entry.end:
+            self._keep(entry)
         before = self._sim.watched
         self._advance(entry)
-        if self._journal is not None and entry.end:
-            self._journal.begin(self._header())
+        if entry.end:
+            self._keep_from_here()
         self._seat.boundary(self._sim.state.tick)
         self._ask()
         self._record(before)  # while the others compute
@@ -254,8 +271,7 @@ class Server:
         self._recent.clear()
         self._ended.clear()
         self._rate_at = self._rate = self._mean_rate = 0.0
-        if self._journal is not None:
-            self._journal.begin(self._header())
+        self._keep_from_here()
         self._ask()
 
     def _reseat(self, request: Control) -> str:
@@ -298,8 +314,15 @@ class Server:
             recent=sum(self._recent) / len(self._recent) if self._recent else 0.0,
             rate=self._rate, mean_rate=self._mean_rate, driver=self._seat.driver, drivers=self._seat.history,
             next=self._seat.waiting, alive=sorted(self._alive),
-            refused=dict(self._bus.refused), hash=state.hash,
+            refused=dict(self._bus.refused), hash=state.hash, warnings=self._warnings(),
         )  # fmt: skip
+
+    def _warnings(self) -> list[str]:
+        found = [f"a simulation that dies now cannot be continued: {self._unkept}"] if self._unkept else []
+        recorded = self._recorded
+        if recorded is not None and recorded.run == self._sim.world.run and recorded.fault:
+            found.append(f"not recorded after tick {recorded.tick}: {recorded.fault}")
+        return found
 
     def _announce(self, now: float) -> None:
         if now - self._rate_at >= 1.0:
@@ -330,21 +353,55 @@ class Server:
     def _header(self) -> bytes:
         return msgspec.msgpack.encode(self._sim.snapshot(list(self._recent), self._seat.driver))
 
+    def _keep(self, entry: Entry) -> None:
+        """Add to the journal, unless it is given up."""
+        if self._journal is None or not self._journal.kept:
+            return
+        try:
+            self._journal.append(msgspec.msgpack.encode(entry))
+        except OSError as error:
+            self._give_up(self._journal, error)
+
+    def _keep_from_here(self) -> None:
+        """Begin the journal anew with the episode, also one that was given up."""
+        if self._journal is None:
+            return
+        try:
+            self._journal.begin(self._header())
+            self._unkept = ""
+        except OSError as error:
+            self._give_up(self._journal, error)
+
+    def _give_up(self, journal: Journal, error: OSError) -> None:
+        journal.give_up()
+        self._unkept = str(unwritten(journal.path, error))
+        if not self._warned:
+            self._warned = True
+            warn(f"{self._unkept}; the run goes on, but cannot be continued if the simulation dies in this episode")
+
     def _continue(self, journal: Journal) -> str:
         """Restore what the journal holds of this run, or begin a new journal; who drove last."""
         frames = journal.read()
-        snapshot = msgspec.msgpack.decode(frames[0], type=Snapshot) if frames else None
+        try:
+            snapshot = msgspec.msgpack.decode(frames[0], type=Snapshot) if frames else None
+        except msgspec.MsgspecError:
+            raise UserError(f"{journal.path}: not the journal of a simulation; name another file") from None
         if snapshot is not None and re.fullmatch(re.escape(self._root) + r"\.[0-9a-f]{4}", snapshot.run):
             self._sim = self._sim.anew(snapshot.seed, snapshot.run)  # it was begun later, by request
-        if snapshot is None or snapshot.run != self._sim.world.run:
-            journal.begin(self._header())
-            return ""
+        try:
+            if snapshot is None or snapshot.run != self._sim.world.run:
+                journal.begin(self._header())
+                return ""
+            if GIVEN_UP in frames:
+                line = "could not be written to its end; the run cannot be continued, begin a new one"
+                raise Unavailable(f"{journal.path}: {line}")
+            journal.resume(frames)
+        except OSError as error:
+            raise unwritten(journal.path, error) from None
         self._sim.restore(snapshot)
         self._recent.extend(snapshot.recent)
-        journal.begin(frames[0])
         driver = snapshot.driver
         for frame in frames[1:]:
-            journal.append(frame)
             self._record(self._sim.state)
             entry = msgspec.msgpack.decode(frame, type=Entry)
             self._advance(entry)
