@@ -150,7 +150,7 @@ def test_a_recording_that_cannot_grow_ends_with_its_summary(recording: Recording
 
 
 def test_a_recording_that_never_began_leaves_no_file(recording: Recording):
-    with no_file_larger_than(100):
+    with no_file_larger_than(20_000):
         record(recording, 300)
         recording.close()
     assert recording.kept == -1

@@ -72,6 +72,20 @@ def write_whole(path: Path, data: bytes) -> None:
         raise unwritten(path, error) from None
 
 
+def append_whole(path: Path, data: bytes) -> None:
+    """Add to the end of a file; what does not fit is an `OSError`, and no part of it stays."""
+    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    try:
+        size = os.fstat(file).st_size
+        try:
+            write_all(file, data)
+        except OSError:
+            os.ftruncate(file, size)
+            raise
+    finally:
+        os.close(file)
+
+
 def write_all(file: int, data: bytes) -> None:
     """`os.write` until everything is written: a nearly full disk takes a part of it without an error."""
     while data:

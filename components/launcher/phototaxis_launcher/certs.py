@@ -2,12 +2,14 @@
 
 import os
 import secrets
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta, Struct
+from phototaxis.disk import try_folder, unwritten
 from phototaxis.errors import UserError
 from phototaxis.options import parse
 from phototaxis.rights import subject
@@ -40,13 +42,15 @@ def main(argv: Sequence[str]) -> int:
     )
     options = parse(Options, argv, "phototaxis certs", about)
     folder = Path(options.out).resolve()
+    if folder.exists():
+        raise UserError(f"--out {options.out}: exists already; remove it or choose another folder")
+    try_folder(folder, "--out")
+    folder.chmod(0o700)
     try:
-        folder.mkdir(mode=0o700, parents=True)
-    except FileExistsError:
-        raise UserError(f"--out {options.out}: exists already; remove it or choose another folder") from None
+        make(folder, options.worlds.split(","), options.host, options.listen, options.port)
     except OSError as error:
-        raise UserError(f"--out {options.out}: {error.strerror}") from None
-    make(folder, options.worlds.split(","), options.host, options.listen, options.port)
+        shutil.rmtree(folder, ignore_errors=True)
+        raise unwritten(folder, error) from None
     print(
         f"{folder}: router-mtls.json5 and router-password.json5 for `phototaxis router --zenoh-config`, and for each "
         f"component WORLD.ROLE.mtls.json5 and WORLD.ROLE.password.json5 for its --zenoh-config",
