@@ -13,7 +13,7 @@ from phototaxis.checkpoint import decode, encode, load, save
 from phototaxis.chunks import Chunks
 from phototaxis.codec import Refused
 from phototaxis.disk import unwritten
-from phototaxis.errors import Unavailable, UserError
+from phototaxis.errors import Unavailable, UserError, warn
 from phototaxis.journal import GIVEN_UP, Journal
 from phototaxis.messages import (
     AgentLog,
@@ -27,7 +27,6 @@ from phototaxis.messages import (
     World,
 )
 from phototaxis.protocol import Once
-from phototaxis.stderr import warn
 
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.many import Flock

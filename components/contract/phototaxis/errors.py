@@ -27,12 +27,24 @@ class ComponentFailed(UserError):
     exit_code = 4
 
 
+ERROR = "phototaxis: error: "
+WARNING = "phototaxis: warning: "
+_said: set[str] = set()
+
+
+def warn(line: str) -> None:
+    """Print ``phototaxis: warning: LINE`` on stderr, once in a process: for what may be meant as it is."""
+    if line not in _said:
+        _said.add(line)
+        print(f"{WARNING}{line}", file=sys.stderr, flush=True)
+
+
 def one_line(main: Callable[[], int]) -> int:
     """Run a command's body; a `UserError` becomes its one line and exit code, Ctrl-C becomes 130."""
     try:
         return main()
     except UserError as error:
-        print(f"phototaxis: error: {error}", file=sys.stderr, flush=True)
+        print(f"{ERROR}{error}", file=sys.stderr, flush=True)
         return error.exit_code
     except KeyboardInterrupt:
         return 130

@@ -247,7 +247,7 @@ class Recorded(Message):
     tick: Annotated[int, Meta(ge=-1)] = -1
     """The newest tick that is on disk; −1 for none."""
     fault: str = ""
-    """Why nothing more is written to disk; "" while all is well."""
+    """Why nothing more is written to disk, in a line; "" while all is well."""
 
 
 class Control(Message):

@@ -1,15 +1,7 @@
-"""Standard error: warnings have one form, and a log on a full disk does not end the process that writes it."""
+"""Standard error: a log on a full disk does not end the process that writes it."""
 
 import io
 import sys
-
-WARNING = "phototaxis: warning: "
-"""How a warning begins; `phototaxis up` repeats those of its components."""
-
-
-def warn(text: str) -> None:
-    """Say what is wrong and does not stop the work."""
-    print(f"{WARNING}{text}", file=sys.stderr, flush=True)
 
 
 class _Dropping(io.FileIO):

@@ -7,8 +7,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 from phototaxis.disk import append_whole, try_folder, unwritten, write_whole
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.stderr import warn
+from phototaxis.errors import Unavailable, UserError, warn
 from phototaxis_sim import arenas
 
 from phototaxis_lab.cell import Cell, Outcome, System

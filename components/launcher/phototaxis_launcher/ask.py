@@ -87,6 +87,8 @@ def describe(status: Status) -> list[str]:
         "driver": status.driver or "nobody",
         "alive": ", ".join(who.split("/")[1] for who in status.alive if not who.startswith("observer/")),
     }
+    if status.warnings:
+        rows["warnings"] = "; ".join(status.warnings)
     if status.refused:
         rows["refused"] = ", ".join(f"{reason} × {count}" for reason, count in status.refused.items())
     return [f"{name:8} {text}" for name, text in rows.items()]

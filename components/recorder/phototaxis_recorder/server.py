@@ -93,7 +93,7 @@ class Server:
         recording.keep()
         recording.close()
         if recording.fault:
-            self._faults.append(f"{recording.fault}; recorded up to tick {recording.kept}")
+            self._faults.append(recording.fault)
 
     def _notice(self, what: str, role: str, ident: str) -> None:
         """Somebody came or went: a simulation may have brought a run; the viewer's log tells of it."""

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import rerun as rr
 from phototaxis.disk import unwritten, write_all
-from phototaxis.errors import Unavailable
+from phototaxis.errors import Unavailable, warn
 from phototaxis.messages import World
 from phototaxis.recordings import write_summary
-from phototaxis.stderr import warn
 from phototaxis.viewer import rerun_program
 
 from phototaxis_recorder.layout import blueprint
@@ -36,13 +35,12 @@ class Recording:
     Attributes
     ----------
     translator : takes what is to be recorded.
-    fault : why the file is not written any more, or lacks its summary; "" while all is well.
+    fault : why the file is not written any more, or lacks its summary, in a line; "" while all is well.
+    kept : the newest tick that is in the file; −1 for none.
     """
 
     def __init__(self, world: World, wanted: Path, host: str, grpc_port: int, memory: str):
-        self.fault = ""
-        self.kept = -1
-        """The newest tick that is in the file."""
+        self.fault, self.kept = "", -1
         self._size, self._warned, self._stopped = 0, False, False
         sinks: list[rr.GrpcServerSink | rr.FileSink] = [rr.GrpcServerSink(host, grpc_port, server_memory_limit=memory)]
         try:
@@ -50,14 +48,14 @@ class Recording:
             sinks.append(rr.FileSink(str(self.file), write_footer=False))
         except OSError as error:
             self.file = wanted
-            self.fault, self._stopped = str(unwritten(wanted, error)), True
+            self._stop(str(unwritten(wanted, error)))
         self._stream = rr.RecordingStream("phototaxis", recording_id=f"{world.run}-{self.file.stem}")
         rr.set_log_time_enabled(False, recording=self._stream)
         self._stream.set_sinks(*sinks, default_blueprint=blueprint(world.arena, world.epochs))
         self._stream.send_recording_name(f"{world.arena.name}, {world.run}")
         self.translator = Translator(self._stream, world)
         if self.fault:
-            self._tell_of_the_end()
+            self._tell(self.fault)
 
     def keep(self) -> None:
         """Bring to disk what was logged, then the summary of it."""
@@ -107,11 +105,12 @@ class Recording:
                 os.truncate(self.file, self._size)
             else:
                 self.file.unlink()
-        self.fault, self._stopped = fault, True
-        self._tell_of_the_end()
+        self._stop(fault)
+        self._tell(self.fault)
 
-    def _tell_of_the_end(self) -> None:
-        self._tell(f"{self.fault}; recorded up to tick {self.kept}, the live view goes on")
+    def _stop(self, fault: str) -> None:
+        self._stopped = True
+        self.fault = f"{fault}; " + (f"recorded up to tick {self.kept}" if self.kept >= 0 else "nothing is recorded")
 
     def _tell(self, text: str) -> None:
         warn(text)

@@ -12,11 +12,10 @@ from phototaxis.bus import Bus, Event
 from phototaxis.chunks import Chunks
 from phototaxis.codec import Refused
 from phototaxis.disk import unwritten
-from phototaxis.errors import Unavailable, UserError
+from phototaxis.errors import Unavailable, UserError, warn
 from phototaxis.journal import GIVEN_UP, Journal
 from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, Phase, Recorded, SimLog, State, Status
 from phototaxis.protocol import Question
-from phototaxis.stderr import warn
 
 from phototaxis_sim.many import SimulationOfMany
 from phototaxis_sim.pace import Pace
@@ -81,8 +80,7 @@ class Server:
         self._mean_rate = 0.0
         self._ended: list[Any] = []
         self._unkept = ""
-        """Why the journal is given up."""
-        self._warned = False
+        """That the journal is given up, and why."""
         self._recorded: Recorded | None = None
         self._log = Chunks(bus, "log/sim", self._chunk)
         self._seat = Seat()
@@ -318,11 +316,9 @@ class Server:
         )  # fmt: skip
 
     def _warnings(self) -> list[str]:
-        found = [f"a simulation that dies now cannot be continued: {self._unkept}"] if self._unkept else []
         recorded = self._recorded
-        if recorded is not None and recorded.run == self._sim.world.run and recorded.fault:
-            found.append(f"not recorded after tick {recorded.tick}: {recorded.fault}")
-        return found
+        unrecorded = recorded.fault if recorded is not None and recorded.run == self._sim.world.run else ""
+        return [fault for fault in (self._unkept, unrecorded) if fault]
 
     def _announce(self, now: float) -> None:
         if now - self._rate_at >= 1.0:
@@ -374,10 +370,8 @@ class Server:
 
     def _give_up(self, journal: Journal, error: OSError) -> None:
         journal.give_up()
-        self._unkept = str(unwritten(journal.path, error))
-        if not self._warned:
-            self._warned = True
-            warn(f"{self._unkept}; the run goes on, but cannot be continued if the simulation dies in this episode")
+        self._unkept = f"{unwritten(journal.path, error)}; a simulation that dies in this episode cannot be continued"
+        warn(self._unkept)
 
     def _continue(self, journal: Journal) -> str:
         """Restore what the journal holds of this run, or begin a new journal; who drove last."""
