@@ -235,14 +235,13 @@ def taking_turns() -> float:
 def recorder_cost(arena: Arena, loop: Loop) -> float:
     """µs a tick to turn log chunks into Rerun columns on disk."""
     from phototaxis.messages import AgentLog, SensorsLog, SimLog
-    from phototaxis_recorder.sinks import open_recording
-    from phototaxis_recorder.translate import Translator
+    from phototaxis_recorder.sinks import Recording
 
     ticks, chunk, began = 8000, 16, 0.0
     with tempfile.TemporaryDirectory() as folder:
         world = World("bench", arena, 1, 0)
-        recording = open_recording(world, Path(folder) / "b.rrd", "127.0.0.1", free_ports(1)[0], "64MiB")
-        translator = Translator(recording, world)
+        recording = Recording(world, Path(folder) / "b.rrd", "127.0.0.1", free_ports(1)[0], "64MiB")
+        translator = recording.translator
         began = time.perf_counter()
         for first in range(0, ticks, chunk):
             tick, ones = list(range(first, first + chunk)), [1.0] * chunk
@@ -252,9 +251,11 @@ def recorder_cost(arena: Arena, loop: Loop) -> float:
             translator.agent(AgentLog("b", 0, "w", "qtable", "simple", tick, zeros, zeros, ones, ones, ones))
             if first % 400 == 0:
                 translator.flush()
+                recording.keep()
         translator.flush(last=True)
+        recording.keep()
         seconds = time.perf_counter() - began
-        recording.disconnect()
+        recording.close()
     return seconds / ticks * 1e6
 
 

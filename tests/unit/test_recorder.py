@@ -1,24 +1,29 @@
 """What the live view is made of: light, colours, policy; and which recordings are removed."""
 
+import shutil
 from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
 import rerun as rr
+from disks import no_file_larger_than
 from phototaxis.arena import Arena, Light, Wall
 from phototaxis.messages import AgentLog, SensorsLog, SimLog, World
-from phototaxis.recordings import Recording
+from phototaxis.ports import free_ports
+from phototaxis.recordings import Recording as Listed
+from phototaxis.recordings import Summary, summary_file
 from phototaxis.task import ACTIONS, PERCEPTS
 from phototaxis_launcher.recordings import DAY, MEGABYTE, excess
 from phototaxis_recorder import policy
 from phototaxis_recorder.colors import of_distance, of_reward
 from phototaxis_recorder.field import CELLS, light_field
+from phototaxis_recorder.sinks import Recording, fresh_file
 from phototaxis_recorder.translate import Translator
 from phototaxis_sensors.light import LightModel
 from phototaxis_sensors.model import Past
 from phototaxis_sensors.scene import Scene
-from rerun_files import series
+from rerun_files import salvaged, series
 
 
 def test_the_field_is_what_an_eye_there_reads():
@@ -72,7 +77,7 @@ def test_the_arrow_points_where_the_action_drives():
 
 def test_old_and_excessive_recordings_go_and_the_one_in_use_stays():
     now = 100.0 * DAY
-    found = [Recording(Path(str(age)), 10 * MEGABYTE, now - age * DAY, None) for age in (0, 1, 2, 3)]
+    found = [Listed(Path(str(age)), 10 * MEGABYTE, now - age * DAY, None) for age in (0, 1, 2, 3)]
     assert excess(found, now, None, None) == []
     assert [one.file.name for one in excess(found, now, 1.5, None)] == ["2", "3"]
     assert [one.file.name for one in excess(found, now, None, 25)] == ["2", "3"]
@@ -105,3 +110,77 @@ def test_a_pose_that_nobody_sensed_has_no_rays_of_another(tmp_path: Path, paper:
     recording.disconnect()
     assert sorted(series(tmp_path / "r.rrd", "/world/trail", "Points2D:positions")) == [0, 1, 2]
     assert sorted(series(tmp_path / "r.rrd", "/world/robot/sonar", "Clear:is_recursive")) == [2]
+
+
+def moved(first: int, ticks: int) -> SimLog:
+    """So many ticks of poses, which differ, so that a recording of them has its size."""
+    tick, none = list(range(first, first + ticks)), [0] * ticks
+    x, ones = np.random.default_rng(first).uniform(1, 9, ticks).tolist(), [1.0] * ticks
+    return SimLog("r", first, "s", "", tick, none, ones, x, x, ones, ones, ones, none, [])
+
+
+@pytest.fixture
+def recording(tmp_path: Path, paper: Arena) -> Recording:
+    """A recording of the run "r" into r.rrd."""
+    return Recording(World("r", paper, 0, 0), tmp_path / "r.rrd", "127.0.0.1", free_ports(1)[0], "16MiB")
+
+
+def record(recording: Recording, until: int) -> None:
+    """A hundred ticks at a time."""
+    for first in range(0, until, 100):
+        recording.translator.sim(moved(first, 100))
+        recording.translator.flush(last=True)
+        recording.keep()
+
+
+def test_a_recording_that_cannot_grow_ends_with_its_summary(recording: Recording, capfd):
+    record(recording, 100)
+    with no_file_larger_than(recording.file.stat().st_size + 30_000):
+        record(recording, 3000)
+        recording.close()
+    summary = msgspec.json.decode(summary_file(recording.file).read_bytes(), type=Summary)
+    kept = series(salvaged(recording.file), "/world/trail", "Points2D:positions")
+    assert 0 < summary.tick < 2999
+    assert sorted(kept) == list(range(summary.tick + 1))
+    assert recording.kept == summary.tick
+    assert recording.fault == f"{recording.file}: File too large"
+    said = f"phototaxis: warning: {recording.fault}; recorded up to tick {summary.tick}, the live view goes on\n"
+    assert capfd.readouterr().err.count(said) == 1
+    assert not [path for path in recording.file.parent.iterdir() if path.suffix in (".new", ".part")]
+
+
+def test_a_recording_that_never_began_leaves_no_file(recording: Recording):
+    with no_file_larger_than(20_000):
+        record(recording, 300)
+        recording.close()
+    assert recording.kept == -1
+    assert not list(recording.file.parent.glob("*.rrd"))
+
+
+def test_a_recording_whose_folder_is_gone_says_so(recording: Recording):
+    record(recording, 100)
+    shutil.rmtree(recording.file.parent)
+    record(recording, 200)
+    recording.close()
+    assert recording.fault == f"{recording.file}: No such file or directory"
+    assert recording.kept == 99
+
+
+def test_a_recording_without_a_place_is_a_live_view(tmp_path: Path, paper: Arena):
+    wanted = tmp_path / "gone" / "r.rrd"
+    recording = Recording(World("r", paper, 0, 0), wanted, "127.0.0.1", free_ports(1)[0], "16MiB")
+    record(recording, 100)
+    recording.close()
+    assert recording.fault == f"{wanted}: No such file or directory"
+
+
+def test_low_space_is_told_once(recording: Recording, monkeypatch: pytest.MonkeyPatch, capsys):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10**9, 10**9 - 10**7, 10**7))
+    record(recording, 300)
+    recording.close()
+    assert capsys.readouterr().err.count("only 10 MB are left on its disk") == 1
+    assert not recording.fault
+
+
+def test_no_recording_is_overwritten(tmp_path: Path):
+    assert [fresh_file(tmp_path / "r.rrd").name for _ in range(3)] == ["r.rrd", "r-2.rrd", "r-3.rrd"]

@@ -7,6 +7,7 @@ from typing import Any
 
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
+from phototaxis.disk import try_file
 from phototaxis.errors import UserError
 from phototaxis.messages import Count, Seed, World
 from phototaxis.session import WorldNames
@@ -68,9 +69,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     options, setup = parse_setup(Options, argv, "phototaxis agent", "Run a learner that drives the robot.")
     worlds = options.worlds.split(",") if options.worlds else []
     kept = Path(options.checkpoint) if options.checkpoint else None
-    folder = kept if kept is None or worlds else kept.parent
-    if folder is not None and not folder.is_dir():
-        raise UserError(f"--checkpoint {kept}: there is no folder {folder}")
+    for file in [] if kept is None else [kept / f"{name}.npz" for name in worlds] or [kept]:
+        try_file(file, "--checkpoint")
+        try_file(file.with_suffix(".journal"), "--checkpoint")
     if options.take_over and options.standby:
         raise UserError("--take-over and --standby exclude each other")
     mode: Mode = "take over" if options.take_over else "stand by" if options.standby else "claim"

@@ -12,8 +12,9 @@ from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import decode, encode, load, save
 from phototaxis.chunks import Chunks
 from phototaxis.codec import Refused
-from phototaxis.errors import UserError, warn
-from phototaxis.journal import Journal
+from phototaxis.disk import unwritten
+from phototaxis.errors import Unavailable, UserError, warn
+from phototaxis.journal import GIVEN_UP, Journal
 from phototaxis.messages import (
     AgentLog,
     CheckpointReply,
@@ -69,6 +70,9 @@ class Server:
     Who waits for the seat of an agent of its own kind (the same learner and percept) inherits from it: a
     standby at once, and then keeps in step with it; a taker-over when it sits down. Behind an agent of
     another kind it learns from what that one does.
+
+    A checkpoint or journal that cannot be written is told, tried again with the next checkpoint, and does not
+    end the learning.
     """
 
     def __init__(
@@ -93,17 +97,25 @@ class Server:
         """Whether it is of the same kind; whether this agent is what it is."""
         self._save_at = self._table_at = self._claim_at = 0.0
         self._saved: tuple[str, int] = ("", -1)
+        self._warned = False
         self._log = Chunks(bus, "log/agent", self._chunk)
 
     def serve(self) -> None:
-        """Drive, or wait for the seat, until a "stop" event or until a successor drives; leave the seat and save."""
+        """Drive, or wait for the seat, until a "stop" event or until a successor drives; leave the seat and save.
+
+        Raises
+        ------
+        Unavailable
+            when the last checkpoint cannot be written.
+        """
         with watched():
             while not self._replaced and self._handle(self._bus.receive(timeout=0.05)):
                 pass
         self._log.flush()
         if self._session is not None:
             self._bus.control(Control("release", self._bus.ident), timeout=0.5)
-            self._save(self._session.agent, last=True)
+            if fault := self._save(self._session.agent, last=True):
+                raise fault
 
     def _handle(self, event: Event | None) -> bool:
         """Do what one event asks for; False when it is to stop."""
@@ -230,7 +242,7 @@ class Server:
         agent = session.agent
         journal = self._journal if isinstance(readings, Readings) else None
         if journal is not None and (readings.run, readings.tick) != agent.tick:
-            journal.append(msgspec.msgpack.encode(readings))
+            self._keep(journal, agent, msgspec.msgpack.encode(readings))
         try:
             command = session.answer(readings)
         except Refused as why:
@@ -268,33 +280,71 @@ class Server:
         return self._session
 
     def _replay(self, session: Session) -> None:
-        """Go through the journal's readings again where they are of this run; begin a new journal."""
-        if self._journal is None:
+        """Go through the journal's readings again where they are of this run; else begin a new journal."""
+        journal = self._journal
+        if journal is None:
             return
         run = session.world.run
-        frames = self._journal.read() if self._resume is not None else []
-        self._journal.begin(run.encode())
-        if not frames or frames[0] != run.encode():
-            return
+        frames = journal.read() if self._resume is not None else []
+        try:
+            if not frames or frames[0] != run.encode():
+                journal.begin(run.encode())
+                return
+            journal.resume(frames)
+        except OSError as error:
+            raise unwritten(journal.path, error) from None
         seen, tick = session.agent.tick
         for frame in frames[1:]:
+            if frame == GIVEN_UP:
+                raise Unavailable(
+                    f"{journal.path}: could not be written to its end; what was learned after tick {tick} is lost, "
+                    f"begin a new run with --resume {self._resume}"
+                )
             readings = msgspec.msgpack.decode(frame, type=Readings)
             if seen != run or readings.tick > tick:
-                self._journal.append(frame)
                 session.answer(readings)
                 self._record(session.agent)
 
-    def _save(self, agent: Agent, last: bool = False) -> None:
-        if self._path is None or agent.tick == self._saved:
-            return
+    def _keep(self, journal: Journal, agent: Agent, entry: bytes) -> None:
+        """Add to the journal; a full one is given up, which frees its space for the checkpoint that replaces it."""
+        for tried_before in (False, True):
+            try:
+                if journal.kept:
+                    journal.append(entry)
+                return
+            except OSError as error:
+                self._tell(unwritten(journal.path, error))
+                journal.give_up()
+            if not tried_before:
+                self._save(agent)
+
+    def _save(self, agent: Agent, last: bool = False) -> UserError | None:
+        """Write the checkpoint and begin the journal anew; why that is not possible now."""
+        self._save_at = time.monotonic() + SAVE_EVERY
+        if self._path is None or (agent.tick == self._saved and (self._journal is None or self._journal.kept)):
+            return None
         meta, arrays = agent.checkpoint()
         if last:
             agent.learner.prove(arrays)
-        save(self._path, meta, arrays)
+        try:
+            save(self._path, meta, arrays)
+        except Unavailable as fault:
+            self._tell(fault)
+            return fault
         self._saved = agent.tick
         if self._journal is not None:
-            self._journal.begin(agent.tick[0].encode())
-        self._save_at = time.monotonic() + SAVE_EVERY
+            try:
+                self._journal.begin(agent.tick[0].encode())
+            except OSError as error:
+                self._journal.give_up()
+                self._tell(unwritten(self._journal.path, error))
+        return None
+
+    def _tell(self, fault: UserError) -> None:
+        """Warn, but once, that something cannot be written."""
+        if not self._warned:
+            self._warned = True
+            warn(f"{self._bus.ident}: {fault}; if it dies now, what it learned since its last checkpoint is lost")
 
     def _record(self, agent: Agent) -> None:
         self._log.add((agent, agent.tick[1], *agent.last), time.monotonic())

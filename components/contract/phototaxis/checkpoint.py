@@ -5,8 +5,6 @@ The file is a NumPy .npz without pickles: the learner's arrays, and `meta`, the 
 
 import hashlib
 import io
-import os
-import secrets
 import zipfile
 import zlib
 from pathlib import Path
@@ -17,6 +15,7 @@ import numpy as np
 from msgspec import Struct
 
 from phototaxis.arena import Arena
+from phototaxis.disk import write_whole
 from phototaxis.errors import UserError
 from phototaxis.messages import End, Motor
 
@@ -161,10 +160,14 @@ def decode(data: bytes, source: str) -> tuple[Meta, dict[str, np.ndarray]]:
 
 
 def save(path: Path, meta: Meta, arrays: dict[str, np.ndarray]) -> None:
-    """Write a checkpoint; a reader sees the old file or the new one, never a part."""
-    fresh = path.with_name(f"{path.name}.{secrets.token_hex(4)}.new")  # of several writers each has its own
-    fresh.write_bytes(encode(meta, arrays))
-    os.replace(fresh, path)
+    """Write a checkpoint; a reader sees the old file or the new one, never a part.
+
+    Raises
+    ------
+    Unavailable
+        when it cannot be written; an older one is then still there.
+    """
+    write_whole(path, encode(meta, arrays))
 
 
 def load(path: Path) -> tuple[Meta, dict[str, np.ndarray]]:

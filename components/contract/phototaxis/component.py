@@ -17,6 +17,7 @@ from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.errors import leave, one_line
 from phototaxis.session import BusOptions, open_session, reaching
+from phototaxis.stderr import may_be_lost
 
 
 class ComponentOptions(BusOptions, kw_only=True):
@@ -87,4 +88,5 @@ def entry(body: Callable[[], None]) -> None:
         body()
         return 0
 
+    may_be_lost()
     leave(one_line(main))

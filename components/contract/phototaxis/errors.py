@@ -33,6 +33,7 @@ class ComponentFailed(UserError):
     exit_code = 4
 
 
+ERROR = "phototaxis: error: "
 WARNING = "phototaxis: warning: "
 _said: set[str] = set()
 
@@ -49,7 +50,7 @@ def one_line(main: Callable[[], int]) -> int:
     try:
         return main()
     except UserError as error:
-        print(f"phototaxis: error: {error}", file=sys.stderr, flush=True)
+        print(f"{ERROR}{error}", file=sys.stderr, flush=True)
         return error.exit_code
     except KeyboardInterrupt:
         return 130

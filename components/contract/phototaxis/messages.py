@@ -242,6 +242,18 @@ class Status(Message):
     refused: dict[str, int] = field(default_factory=dict)
     """Messages refused or ignored by the simulation, by reason."""
     hash: str = ""
+    warnings: list[str] = field(default_factory=list)
+    """What is wrong and does not stop the run, such as a recording that was cut short."""
+
+
+class Recorded(Message):
+    """How far the recording of a run is, once a second."""
+
+    run: Name
+    tick: Annotated[int, Meta(ge=-1)] = -1
+    """The newest tick that is on disk; −1 for none."""
+    fault: str = ""
+    """Why nothing more is written to disk, in a line; "" while all is well."""
 
 
 class Control(Message):

@@ -1,10 +1,12 @@
 """What there is on disk: recordings, and the summary that the recorder keeps beside each."""
 
-import os
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
+
+from phototaxis.disk import write_whole
 
 
 class Summary(msgspec.Struct):
@@ -44,21 +46,18 @@ def summary_file(file: Path) -> Path:
 
 
 def write_summary(file: Path, summary: Summary) -> None:
-    """Put the summary beside its recording, whole or not at all."""
-    target = summary_file(file)
-    fresh = target.with_suffix(".json.new")
-    fresh.write_bytes(msgspec.json.encode(summary))
-    os.replace(fresh, target)
+    """Put the summary beside its recording, whole or not at all; `Unavailable` when it cannot be written."""
+    write_whole(summary_file(file), msgspec.json.encode(summary))
 
 
 def recordings(folder: Path) -> list[Recording]:
     """All recordings in a folder and the folders of runs in it, the newest first."""
     found = []
     for file in {*folder.glob("*.rrd"), *folder.glob("*/*.rrd")}:
-        try:
+        summary = None
+        with suppress(OSError, msgspec.DecodeError):
             summary = msgspec.json.decode(summary_file(file).read_bytes(), type=Summary)
-        except (FileNotFoundError, msgspec.DecodeError):
-            summary = None
-        info = file.stat()
-        found.append(Recording(file, info.st_size, info.st_mtime, summary))
+        with suppress(FileNotFoundError):  # somebody removes it just now
+            info = file.stat()
+            found.append(Recording(file, info.st_size, info.st_mtime, summary))
     return sorted(found, key=lambda recording: recording.written, reverse=True)

@@ -72,6 +72,7 @@ TOPICS = {
             m.LaunchReply,
             4_096,
         ),
+        Topic("recording", m.Recorded, "recorder", "stream", 4_096, "how far the recording is, once a second"),
         Topic("log/sim", m.SimLog, "sim", "log", 1_000_000, "poses, commands, ended episodes, in columns"),
         Topic("log/sensors", m.SensorsLog, "sensors", "log", 1_000_000, "readings, in columns"),
         Topic("log/agent", m.AgentLog, "agent", "log", 4_000_000, "percepts, actions, learning, in columns"),
@@ -92,7 +93,7 @@ class Role(NamedTuple):
 
 
 ROLES = {
-    "sim": Role(reads=("command", "crowd/command"), dials=(), at_times=("readings", "crowd/readings")),
+    "sim": Role(reads=("command", "crowd/command", "recording"), dials=(), at_times=("readings", "crowd/readings")),
     "sensors": Role(reads=("state", "crowd/state"), dials=("sim",), asks=("world", "log/sim")),
     "recorder": Role(reads=("log/sim", "log/sensors", "log/agent"), dials=("sim", "sensors"), asks=("world",)),
     "agent": Role(

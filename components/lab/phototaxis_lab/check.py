@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import zenoh
 from msgspec import Meta
 from phototaxis import doors, rights, wire
+from phototaxis.disk import try_folder, write_whole
 from phototaxis.errors import UserError
 from phototaxis.options import parse
 from phototaxis.router import router_config, text
@@ -94,9 +95,6 @@ def _wire(options: Options) -> int:
 
 
 def _put(file: Path, content: str) -> None:
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(content)
-    except OSError as error:
-        raise UserError(f"{file}: {error.strerror}") from None
+    try_folder(file.parent, "--file")
+    write_whole(file, content.encode())
     print(file, file=sys.stderr)

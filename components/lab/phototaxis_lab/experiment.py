@@ -45,10 +45,9 @@ def main(argv: Sequence[str]) -> int:
 
     results = compute(cells(options), Path(options.out), options)
     summaries = summarise(results)
-    if options.json:
-        print(json.dumps({"out": options.out, "systems": summaries}))
-    else:
-        print(describe(summaries))
+    text = json.dumps({"out": options.out, "systems": summaries}) if options.json else describe(summaries)
+    print(text, flush=True)
+    results.settle()
     return 0
 
 

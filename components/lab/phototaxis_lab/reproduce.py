@@ -5,7 +5,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from phototaxis.errors import UserError
+from phototaxis.disk import try_folder
 from phototaxis.options import parse
 
 from phototaxis_lab.running import SEEDS, Running, seed_range
@@ -29,10 +29,8 @@ def main(argv: Sequence[str]) -> int:
     from phototaxis_lab.grid import by_system, compute
     from phototaxis_lab.reproduction import page, plan
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--out {out}: {error.strerror}") from None
+    try_folder(out, "--out")
+    try_folder(Path(options.results), "--results")
     found = {}
     for part, planned in plan.PARTS.items():
         began, cells = time.monotonic(), plan.cells(planned, seeds)

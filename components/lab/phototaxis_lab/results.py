@@ -6,7 +6,8 @@ from typing import Any
 
 import msgspec
 from msgspec import Struct
-from phototaxis.errors import UserError
+from phototaxis.disk import append_whole, try_folder, unwritten, write_whole
+from phototaxis.errors import Unavailable, UserError, warn
 from phototaxis_sim import arenas
 
 from phototaxis_lab.cell import Cell, Outcome, System
@@ -31,15 +32,18 @@ class Results:
     ------
     UserError
         when the folder holds the results of other cells, or cannot be written.
+
+    Outcomes that find no room on the disk are kept in memory and are written as soon as there is some.
     """
 
     def __init__(self, folder: Path, cells: Sequence[Cell]):
         self._path, self.cells = folder / "results.jsonl", list(cells)
         grid, encoded = folder / "grid.json", _grid(self.cells)
+        self._waiting: list[bytes] = []
+        try_folder(folder, "--out")
         try:
-            folder.mkdir(parents=True, exist_ok=True)
             if not grid.exists():
-                grid.write_bytes(encoded)
+                write_whole(grid, encoded)
             elif grid.read_bytes() != encoded:
                 raise UserError(f"{folder}: holds the results of another grid; give another folder, or remove this one")
             self.done: dict[int, Outcome] = self._read()
@@ -70,10 +74,30 @@ class Results:
         return [index for index in range(len(self.cells)) if index not in self.done]
 
     def add(self, index: int, outcome: Outcome) -> None:
-        """Keep an outcome, at once."""
-        with self._path.open("ab") as file:
-            file.write(msgspec.json.encode(Row(self.cells[index], outcome)) + b"\n")
+        """Keep an outcome, at once if the disk has room."""
         self.done[index] = outcome
+        self._waiting.append(msgspec.json.encode(Row(self.cells[index], outcome)) + b"\n")
+        first = len(self._waiting) == 1
+        try:
+            self.settle()
+        except Unavailable as fault:
+            if first:
+                warn(f"{fault}; the outcomes from now on are lost if you end this before there is room again")
+
+    def settle(self) -> None:
+        """Write the outcomes that wait for room.
+
+        Raises
+        ------
+        Unavailable
+            when there is still none.
+        """
+        while self._waiting:
+            try:
+                append_whole(self._path, self._waiting[0])
+            except OSError as error:
+                raise unwritten(self._path, error) from None
+            self._waiting.pop(0)
 
 
 def _grid(cells: Sequence[Cell]) -> bytes:

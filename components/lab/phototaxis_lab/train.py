@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from msgspec import Meta
 from phototaxis.checkpoint import save
+from phototaxis.disk import try_file
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Seed
@@ -38,26 +39,28 @@ def main(argv: Sequence[str]) -> int:
     options, setup, fmus = parse_setup(Options, argv, "phototaxis train", about, **{"sensor models": FmuOptions})
     if options.checkpoint and options.seeds:
         raise UserError("--checkpoint keeps one learner, --seeds makes many; give one of the two")
-    if options.checkpoint and not Path(options.checkpoint).parent.is_dir():
-        raise UserError(f"--checkpoint {options.checkpoint}: there is no folder {Path(options.checkpoint).parent}")
+    if options.checkpoint:
+        try_file(Path(options.checkpoint), "--checkpoint")
     if options.seeds and fmus != FmuOptions():
         raise UserError("--seeds makes many learners at once, with the built-in sensors; leave the FMU out")
     from phototaxis_sensors.choice import choose
     from phototaxis_sim import arenas
 
-    arena = arenas.enter(options.arena)
+    arena, fault = arenas.enter(options.arena), None
     if options.seeds:
         found = many(options, setup)
     else:
         with choose(fmus) as make:
-            found = one(options, setup, arena, make)
+            found, fault = one(options, setup, arena, make)
     if options.json:
-        print(json.dumps(found))
+        print(json.dumps(found), flush=True)
+    if fault:
+        raise fault
     return 0
 
 
-def one(options: Options, setup: Any, arena: Any, make: Any) -> dict[str, Any]:
-    """One seed: hashes, rate and, if wanted, the checkpoint."""
+def one(options: Options, setup: Any, arena: Any, make: Any) -> tuple[dict[str, Any], UserError | None]:
+    """One seed: hashes, rate and, if wanted, the checkpoint; and why that could not be written."""
     from phototaxis_agent.stuck import watched
 
     from phototaxis_lab.loop import train
@@ -65,9 +68,13 @@ def one(options: Options, setup: Any, arena: Any, make: Any) -> dict[str, Any]:
     with watched():
         loop, seconds = train(setup, arena, options.seed, options.epochs, make)
         meta, arrays = loop.agent.checkpoint()
-    if options.checkpoint:
-        loop.agent.learner.prove(arrays)
-        save(Path(options.checkpoint), meta, arrays)
+    kept, fault = options.checkpoint or None, None
+    try:
+        if kept:
+            loop.agent.learner.prove(arrays)
+            save(Path(kept), meta, arrays)
+    except UserError as error:
+        kept, fault = None, error
     simulation = loop.simulation
     found = {
         "arena": options.arena,
@@ -80,14 +87,15 @@ def one(options: Options, setup: Any, arena: Any, make: Any) -> dict[str, Any]:
         "ticks_per_second": round(simulation.state.tick / seconds, 1),
         "state_hash": simulation.state.hash,
         "learner_hash": meta.learner_hash,
-        "checkpoint": options.checkpoint or None,
+        "checkpoint": kept,
     }
     if not options.json:
         print(
             f"{found['epochs']} epochs, {found['episodes']} episodes, {found['reached']} of them reached the light; "
-            f"{found['ticks_per_second']} ticks/s; state {found['state_hash']}, learner {found['learner_hash']}"
+            f"{found['ticks_per_second']} ticks/s; state {found['state_hash']}, learner {found['learner_hash']}",
+            flush=True,
         )
-    return found
+    return found, fault
 
 
 def many(options: Options, setup: Any) -> dict[str, Any]:

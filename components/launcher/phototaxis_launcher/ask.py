@@ -89,6 +89,8 @@ def describe(status: Status) -> list[str]:
     }
     if status.late:
         rows["late"] = f"{status.late} ticks without a command in time" + f"; {status.too_slow}" * bool(status.too_slow)
+    if status.warnings:
+        rows["warnings"] = "; ".join(status.warnings)
     if status.refused:
         rows["refused"] = ", ".join(f"{reason} × {count}" for reason, count in status.refused.items())
     return [f"{name:8} {text}" for name, text in rows.items()]

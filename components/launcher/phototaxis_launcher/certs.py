@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta, Struct
+from phototaxis.disk import try_folder, unwritten
 from phototaxis.errors import UserError
 from phototaxis.options import parse
 from phototaxis.rights import subject
@@ -43,17 +44,15 @@ def main(argv: Sequence[str]) -> int:
     if ":" in options.host:
         raise UserError(f"--host {options.host}: Zenoh's TLS knows names and IPv4 addresses; give one of these")
     folder = Path(options.out).resolve()
-    try:
-        folder.mkdir(mode=0o700, parents=True)
-    except FileExistsError:
-        raise UserError(f"--out {options.out}: exists already; remove it or choose another folder") from None
-    except OSError as error:
-        raise UserError(f"--out {options.out}: {error.strerror}") from None
+    if folder.exists():
+        raise UserError(f"--out {options.out}: exists already; remove it or choose another folder")
+    try_folder(folder, "--out")
+    folder.chmod(0o700)
     try:
         make(folder, list(dict.fromkeys(options.worlds.split(","))), options.host, options.listen, options.port)
     except OSError as error:
         shutil.rmtree(folder, ignore_errors=True)
-        raise UserError(f"--out {options.out}: {error.strerror}") from None
+        raise unwritten(folder, error) from None
     print(
         f"{folder}: router-mtls.json5 and router-password.json5 for `phototaxis router --zenoh-config`, and for each "
         f"component WORLD.ROLE.mtls.json5 and WORLD.ROLE.password.json5 for its --zenoh-config",

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from phototaxis import __version__
 from phototaxis.errors import UserError, leave, one_line
+from phototaxis.stderr import may_be_lost
 
 
 class Verb(NamedTuple):
@@ -49,6 +50,7 @@ VERBS = {
 
 def main() -> None:
     """Entry point of the `phototaxis` command."""
+    may_be_lost()
     leave(one_line(lambda: dispatch(sys.argv[1:])))
 
 

@@ -21,6 +21,8 @@ def main(argv: Sequence[str]) -> int:
     if not result["finished"]:
         print("stopped before the end; nothing is evaluated", file=sys.stderr)
         return 0
+    if result["checkpoint"] is None:
+        run.judge()
     placements = 200
     evaluate = [sys.executable, "-m", "phototaxis_launcher", "evaluate", str(run.checkpoint), "--json", *flags(fmus)]
     evaluate.append(f"--arena={options.arena}")
@@ -42,4 +44,5 @@ within {found["cap"]} steps. The paper reports "upwards of 80%" for this system 
   checkpoint  {result["checkpoint"]}
               measure again: {Path(sys.executable).parent / "phototaxis"} evaluate {result["checkpoint"]}"""
     )
+    run.judge()
     return 0

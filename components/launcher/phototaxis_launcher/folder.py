@@ -1,8 +1,9 @@
 """The folder of a run."""
 
+from contextlib import suppress
 from pathlib import Path
 
-from phototaxis.errors import UserError
+from phototaxis.disk import try_folder
 from phototaxis.messages import run_name
 
 
@@ -11,15 +12,12 @@ def run_folder(out: Path) -> Path:
 
     Raises
     ------
-    UserError
-        when it cannot be made.
+    UserError, Unavailable
+        when it cannot be made, or the disk is full.
     """
+    try_folder(out.resolve(), "--out")
     while True:
         folder = out.resolve() / run_name()
-        try:
-            folder.mkdir(parents=True)
+        with suppress(FileExistsError):
+            folder.mkdir()
             return folder
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise UserError(f"--out {out}: {error.strerror}") from None

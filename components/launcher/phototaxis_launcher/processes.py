@@ -6,9 +6,11 @@ import sys
 import time
 from collections import deque
 from pathlib import Path
+from typing import IO
 
 from phototaxis.component import made_up
-from phototaxis.errors import WARNING, ComponentFailed, Unavailable, UserError
+from phototaxis.disk import try_file, unwritten
+from phototaxis.errors import ERROR, WARNING, ComponentFailed, Unavailable, UserError
 
 RESTARTS = 3
 WITHIN = 20.0
@@ -53,7 +55,7 @@ class Child:
         if self.label:
             self.idents.append(made_up(self.label))
             extra = *extra, f"--ident={self.idents[-1]}"
-        with self._log.open("ab") as log:
+        with self._open_log() as log:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", self._module, "--tethered", *self._arguments, *extra],
                 stdin=subprocess.PIPE,
@@ -62,6 +64,12 @@ class Child:
                 start_new_session=True,
                 env=os.environ | {"PYTHONFAULTHANDLER": "1"},  # where a crash happened, in the log
             )
+
+    def _open_log(self) -> IO[bytes]:
+        try:
+            return self._log.open("ab")
+        except OSError as error:
+            raise unwritten(self._log, error) from None
 
     def watch(self) -> bool:
         """Restart the process if it has died; whether it had to. One that may leave and did has `left`.
@@ -80,8 +88,7 @@ class Child:
             self.left = True
             return False
         if code in MENDABLE:
-            line = self.tail(1).removeprefix("phototaxis: error: ")
-            raise MENDABLE[code](f"{self.name}: {line}")
+            raise MENDABLE[code](self.fault())
         self.bring_back()
         return True
 
@@ -142,6 +149,22 @@ class Child:
         """What it wrote before it died; of a crash in compiled code, where that was."""
         fatal = self.tail(100).rpartition("Fatal Python error")
         return "\n".join((fatal[1] + fatal[2]).splitlines()[:6]) if fatal[1] else self.tail(20)
+
+    def fault(self) -> str:
+        """The line with which it ended because of something that the user can mend; "" when it did not."""
+        if self.process is None or self.process.returncode not in MENDABLE:
+            return ""
+        said = [line for line in self.tail(20).splitlines() if line.startswith(ERROR)]
+        if said:
+            return f"{self.name}: {said[-1].removeprefix(ERROR)}"
+        return f"{self.name}: exit code {self.process.returncode}; {self._why_no_word()}"
+
+    def _why_no_word(self) -> str:
+        try:
+            try_file(self._log, "its log")
+        except UserError as error:
+            return str(error)
+        return f"see {self._log}"
 
     def tail(self, lines: int) -> str:
         """The last lines it wrote."""

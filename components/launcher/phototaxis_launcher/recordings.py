@@ -43,8 +43,11 @@ def main(argv: Sequence[str]) -> int:
     doomed = excess(found, time.time(), options.max_age, options.max_size)
     for recording in doomed:
         if not options.dry_run:
-            recording.file.unlink()
-            summary_file(recording.file).unlink(missing_ok=True)
+            try:
+                recording.file.unlink(missing_ok=True)
+                summary_file(recording.file).unlink(missing_ok=True)
+            except OSError as error:
+                raise UserError(f"{recording.file}: cannot be removed: {error.strerror}") from None
         print(f"{'would remove' if options.dry_run else 'removed'} {recording.file}", file=sys.stderr)
     rest = found if options.dry_run else [recording for recording in found if recording not in doomed]
     if options.json:

@@ -12,7 +12,7 @@ from typing import Annotated
 from msgspec import Meta
 from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
-from phototaxis.errors import ComponentFailed, UserError, warn
+from phototaxis.errors import ComponentFailed, Unavailable, UserError, warn
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import MOST, Count, Launch, LaunchReply, Seed, Status
 from phototaxis.options import Parser, add_options, convert, flags, peek
@@ -72,6 +72,8 @@ class Run:
         swaps = swap_plan(options.swap)
         self.folder = run_folder(Path(options.out))
         self.name = self.folder.name
+        self._lost: UserError | None = None
+        """How the recorder ended before the run did."""
         self.checkpoint = self._checkpoint("agent")
         """That of the agent that drove last."""
         self.recording = self.folder / "recording.rrd"
@@ -174,6 +176,11 @@ class Run:
                 if child.watch():
                     progress.say(f"{child.name} ended and was restarted; see {self.folder}")
             except UserError as error:
+                if child.name == "recorder" and self.children["agent"].process is not None:
+                    self._lost = error
+                    del self.children["recorder"]
+                    warn(f"{error}; the run goes on without it")
+                    continue
                 if not self._answer(child, LaunchReply(str(error))):
                     raise
                 progress.say(str(error))
@@ -221,7 +228,9 @@ class Run:
         return bool(asked)
 
     def _report(self, status: Status, progress: Progress) -> None:
-        """Say who is alive, when that changes."""
+        """Say what the status warns of, and who is alive when that changes."""
+        for line in status.warnings:
+            warn(line)
         alive = [who.split("/")[1] for who in status.alive if not who.startswith("observer/")]
         if alive != self._alive:
             self._alive = alive
@@ -259,7 +268,8 @@ class Run:
 
     def result(self, status: Status) -> dict[str, object]:
         """What the run came to; the learner is the one that drove last."""
-        meta = load(self.checkpoint)[0] if self.checkpoint.exists() else None
+        saved = self.checkpoint.exists() and not any(agent.fault() for agent in self.agents)
+        meta = load(self.checkpoint)[0] if saved else None
         names = {ident: agent for agent in self.agents for ident in agent.idents}
         recordings = sorted(self.folder.glob("recording*.rrd"), key=lambda path: path.stat().st_mtime)
         return {
@@ -292,7 +302,18 @@ class Run:
             "late_ticks": status.late,
             "late_sensors": status.late_sensors,
             "refused": status.refused,
+            "warnings": [*status.warnings, *map(str, self._faults())],
         }
+
+    def _faults(self) -> list[UserError]:
+        """What ended before its time, or could not be saved to its end."""
+        unsaved = [Unavailable(fault) for child in self._all() if (fault := child.fault())]
+        return [*([self._lost] if self._lost else []), *unsaved]
+
+    def judge(self) -> None:
+        """Raise what did not keep the run from its end: a recording or a checkpoint that could not be written."""
+        for fault in self._faults():
+            raise fault
 
 
 def swap_plan(text: str) -> list[tuple[int, str]]:
@@ -339,6 +360,7 @@ def main(argv: Sequence[str]) -> int:
             f"none of {status.late} ticks had a command in time: the {part} cannot keep up with {status.speed:g} × real"
         )
         raise ComponentFailed(f"{line} time, and the robot never moved; lower --speed (0: as fast as it goes)")
+    run.judge()
     return 0
 
 

@@ -10,11 +10,11 @@ from msgspec import Meta
 from phototaxis import doors
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
+from phototaxis.disk import try_file, try_folder
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse
 from phototaxis.ports import find_ports
-from phototaxis.recordings import write_summary
 from phototaxis.viewer import viewer_url
 
 
@@ -40,42 +40,31 @@ def main(argv: Sequence[str] | None = None) -> None:
             f"--bind {options.bind}: others could watch, and nothing guards that; use 127.0.0.1, or add --insecure"
         )
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")  # its files get their footer later
-    import rerun as rr
-
     from phototaxis_recorder.server import Server
-    from phototaxis_recorder.sinks import Page, complete, fresh_file, open_recording
-    from phototaxis_recorder.translate import Translator
+    from phototaxis_recorder.sinks import Page, Recording
 
     output = Path(options.output)
-    if not output.parent.is_dir():
-        raise UserError(f"--output {output}: there is no folder {output.parent}")
+    if output.is_dir():
+        try_folder(output, "--output")
+    else:
+        try_file(output, "--output")
     wanted = {"--grpc-port": options.grpc_port, "--web-port": options.web_port}
     grpc_port, web_port = find_ports(options.bind, wanted)
-    recording: list[rr.RecordingStream] = []
-    file = output
 
-    def start(world: World) -> Translator:
-        nonlocal file
-        file = fresh_file(output / f"{world.run}.rrd" if output.is_dir() else output)
-        recording.append(open_recording(world, file, options.bind, grpc_port, options.memory))
-        return Translator(recording[0], world)
-
-    def finish() -> None:
-        while recording:
-            recording.pop().disconnect()
-            complete(file)
+    def start(world: World) -> Recording:
+        file = output / f"{world.run}.rrd" if output.is_dir() else output
+        return Recording(world, file, options.bind, grpc_port, options.memory)
 
     page = Page(options.bind, web_port, grpc_port) if web_port >= 0 else None
     if page is not None:
         print(f"recorder: watch at {viewer_url(web_port, grpc_port)}", file=sys.stderr, flush=True)
 
     def serve(bus: Bus) -> None:
-        Server(bus, start, finish, lambda summary: write_summary(file, summary)).serve()
+        Server(bus, start).serve()
 
     try:
         run("recorder", options, serve)
     finally:
-        finish()
         if page is not None:
             page.close()
 

@@ -6,11 +6,11 @@ from typing import Any
 
 from phototaxis.bus import Bus
 from phototaxis.codec import Decoder, Refused
-from phototaxis.messages import LogRequest, World
-from phototaxis.recordings import Summary
+from phototaxis.errors import Unavailable
+from phototaxis.messages import LogRequest, Recorded, World
 from phototaxis.topics import ROLES, TOPICS
 
-from phototaxis_recorder.translate import Translator
+from phototaxis_recorder.sinks import Recording
 
 FLUSH_EVERY = 0.15
 CATCH_UP_EVERY = 1.0
@@ -23,21 +23,15 @@ class Server:
 
     Parameters
     ----------
-    start : called with the world of a run, begins a recording and returns its translator.
-    finish : called when a recording is to be closed.
-    tell : called with the recording's summary from time to time.
+    start : called with the world of a run, begins its recording.
     """
 
-    def __init__(
-        self,
-        bus: Bus,
-        start: Callable[[World], Translator],
-        finish: Callable[[], None],
-        tell: Callable[[Summary], None],
-    ):
-        self._bus, self._start, self._finish, self._tell = bus, start, finish, tell
+    def __init__(self, bus: Bus, start: Callable[[World], Recording]):
+        self._bus, self._start = bus, start
         self._run = ""
-        self._translator: Translator | None = None
+        self._recording: Recording | None = None
+        self._faults: list[str] = []
+        """Of the recordings that are closed."""
         self._expected: dict[tuple[str, str], int] = {}
         """The next chunk of each topic and writer."""
         self._writer: dict[str, str] = {}
@@ -48,7 +42,21 @@ class Server:
         self._decoders = {name: Decoder(TOPICS[name].message, TOPICS[name].limit) for name in LOGS}
 
     def serve(self) -> None:
-        """Record until a "stop" event; then take what is still to be had and close the recording."""
+        """Record until a "stop" event; then take what is still to be had and close the recording.
+
+        Raises
+        ------
+        Unavailable
+            when not all of a recording could be written.
+        """
+        try:
+            self._record()
+        finally:
+            self._close()
+        if self._faults:
+            raise Unavailable(self._faults[0])
+
+    def _record(self) -> None:
         flush_at = catch_up_at = 0.0
         while True:
             event = self._bus.receive(timeout=FLUSH_EVERY)
@@ -60,35 +68,40 @@ class Server:
                 elif event.topic in ("alive", "gone"):
                     self._notice(event.topic, *event.message)
             now = time.monotonic()
-            if self._translator is not None and now >= flush_at:
-                self._translator.flush()
+            recording = self._recording
+            if recording is not None and now >= flush_at:
+                recording.translator.flush()
+                recording.keep()
                 flush_at = now + FLUSH_EVERY
-            if self._translator is not None and now >= catch_up_at:
-                self._tell(self._translator.summary)
-                behind = self._translator.behind()
+            if recording is not None and now >= catch_up_at:
+                self._bus.put("recording", Recorded(self._run, recording.kept, recording.fault))
+                behind = recording.translator.behind()
                 for topic in LOGS:
                     if topic.removeprefix("log/") in behind or now - self._heard.get(topic, 0.0) > CATCH_UP_EVERY:
                         self._catch_up(topic)
                 catch_up_at = time.monotonic() + CATCH_UP_EVERY  # what has come meanwhile has its turn first
-        if self._translator is not None:
+        if self._recording is not None:
             for topic in LOGS:
                 self._catch_up(topic)
-        self._close()
 
     def _close(self) -> None:
         """Write what waits and close the recording, if there is one."""
-        if self._translator is not None:
-            self._translator.flush(last=True)
-            self._tell(self._translator.summary)
-        self._finish()
+        recording, self._recording = self._recording, None
+        if recording is None:
+            return
+        recording.translator.flush(last=True)
+        recording.keep()
+        recording.close()
+        if recording.fault:
+            self._faults.append(recording.fault)
 
     def _notice(self, what: str, role: str, ident: str) -> None:
         """Somebody came or went: a simulation may have brought a run; the viewer's log tells of it."""
         (self._alive.add if what == "alive" else self._alive.discard)(ident)
         if what == "alive" and role == "sim":
             self._meet()
-        if self._translator is not None and role in ROLES and role != "observer":
-            self._translator.event(f"{ident} {'is here' if what == 'alive' else 'is gone'}")
+        if self._recording is not None and role in ROLES and role != "observer":
+            self._recording.translator.event(f"{ident} {'is here' if what == 'alive' else 'is gone'}")
 
     def _meet(self) -> None:
         """Begin a recording if there is a run that is not yet recorded."""
@@ -97,7 +110,7 @@ class Server:
             return
         self._close()
         self._run, self._expected, self._writer = world.run, {}, {}
-        self._translator = self._start(world)
+        self._recording = self._start(world)
 
     def _take(self, topic: str, chunk: Any) -> None:
         """One chunk; what was missed before it is asked for first."""
@@ -124,13 +137,10 @@ class Server:
                 self._bus.refuse(topic, str(why))
 
     def _write(self, topic: str, chunk: Any) -> None:
-        if chunk.run != self._run or self._translator is None:
+        if chunk.run != self._run or self._recording is None:
             return
         if chunk.seq < self._expected.get((topic, chunk.writer), 0):
             return
         self._expected[topic, chunk.writer] = chunk.seq + 1
-        {
-            "log/sim": self._translator.sim,
-            "log/sensors": self._translator.sensors,
-            "log/agent": self._translator.agent,
-        }[topic](chunk)
+        translator = self._recording.translator
+        {"log/sim": translator.sim, "log/sensors": translator.sensors, "log/agent": translator.agent}[topic](chunk)

@@ -1,52 +1,142 @@
 """Where a recording goes: a file, the live gRPC server, and a page with the web viewer."""
 
 import os
+import shutil
 import subprocess
+from contextlib import suppress
+from itertools import count
 from pathlib import Path
 
 import rerun as rr
+from phototaxis.disk import unwritten, write_all
+from phototaxis.errors import Unavailable, warn
 from phototaxis.messages import World
+from phototaxis.recordings import write_summary
 from phototaxis.viewer import rerun_program
 
 from phototaxis_recorder.layout import blueprint
+from phototaxis_recorder.translate import Translator
 
 LARGE = 250_000_000
 """Bytes above which a recording is not rewritten at its end: that takes more than twice as much memory."""
+LOW = 200_000_000
+"""Bytes that are left on a disk below which a recording warns."""
+TRIAL = 1_000_000
+"""Bytes that are written to find out why a file cannot be written on."""
 
 
-def open_recording(world: World, file: Path, host: str, grpc_port: int, memory: str) -> rr.RecordingStream:
-    """A recording that goes to a file and to a live server at the same time.
+class Recording:
+    """The recording of one run: a live server, and a file whose summary says how far it goes.
 
-    The file has no footer while it grows: Rerun would keep the footer's entries in memory, some 20 MB a minute
-    at full speed. `complete` adds it.
+    At the first failure the file is cut back to what the last summary tells, and is written no more; the live
+    view goes on. Rerun does not say that its file has failed, but cannot be flushed any more. The file has no
+    footer while it grows: Rerun would keep the footer's entries in memory, some 20 MB a minute at full speed.
+
+    Attributes
+    ----------
+    translator : takes what is to be recorded.
+    fault : why the file is not written any more, or lacks its summary, in a line; "" while all is well.
+    kept : the newest tick that is in the file; −1 for none.
     """
-    recording = rr.RecordingStream("phototaxis", recording_id=f"{world.run}-{file.stem}")
-    rr.set_log_time_enabled(False, recording=recording)
-    server = rr.GrpcServerSink(host, grpc_port, server_memory_limit=memory)
-    disk = rr.FileSink(str(file), write_footer=False)
-    recording.set_sinks(server, disk, default_blueprint=blueprint(world.arena, world.epochs))
-    recording.send_recording_name(f"{world.arena.name}, {world.run}")
-    return recording
+
+    def __init__(self, world: World, wanted: Path, host: str, grpc_port: int, memory: str):
+        self.fault, self.kept = "", -1
+        self._size, self._warned, self._stopped = 0, False, False
+        sinks: list[rr.GrpcServerSink | rr.FileSink] = [rr.GrpcServerSink(host, grpc_port, server_memory_limit=memory)]
+        try:
+            self.file = fresh_file(wanted)
+            sinks.append(rr.FileSink(str(self.file), write_footer=False))
+        except OSError as error:
+            self.file = wanted
+            self._stop(str(unwritten(wanted, error)))
+        self._stream = rr.RecordingStream("phototaxis", recording_id=f"{world.run}-{self.file.stem}")
+        rr.set_log_time_enabled(False, recording=self._stream)
+        self._stream.set_sinks(*sinks, default_blueprint=blueprint(world.arena, world.epochs))
+        self._stream.send_recording_name(f"{world.arena.name}, {world.run}")
+        self.translator = Translator(self._stream, world)
+        if self.fault:
+            self._tell(self.fault)
+
+    def keep(self) -> None:
+        """Bring to disk what was logged, then the summary of it."""
+        if self._stopped:
+            return
+        summary = self.translator.summary
+        try:
+            self._stream.flush()
+            size = self.file.stat().st_size
+            write_summary(self.file, summary)
+        except (RuntimeError, OSError) as error:
+            self._cut(str(unwritten(self.file, error)) if isinstance(error, OSError) else self._cause())
+        except Unavailable as error:  # the recording itself is well
+            self.fault = str(error)
+        else:
+            self.fault, self._size, self.kept = "", size, summary.tick
+            self._mind_the_space()
+
+    def close(self) -> None:
+        """Close the file, and add its footer where there is room."""
+        self._stream.disconnect()
+        if not self._stopped:
+            complete(self.file)
+
+    def _mind_the_space(self) -> None:
+        free = shutil.disk_usage(self.file.parent).free
+        if free < LOW and not self._warned:
+            self._warned = True
+            self._tell(f"{self.file}: only {free / 1e6:.0f} MB are left on its disk")
+
+    def _cause(self) -> str:
+        """Why nothing more can be written to the file."""
+        try:
+            file = os.open(self.file, os.O_WRONLY | os.O_APPEND)
+            try:
+                write_all(file, bytes(TRIAL))
+            finally:
+                os.close(file)
+        except OSError as error:
+            return str(unwritten(self.file, error))
+        return f"{self.file}: could not be written for a moment"
+
+    def _cut(self, fault: str) -> None:
+        """Take back what the last summary does not tell of; without one, the file."""
+        with suppress(OSError):
+            if self._size:
+                os.truncate(self.file, self._size)
+            else:
+                self.file.unlink()
+        self._stop(fault)
+        self._tell(self.fault)
+
+    def _stop(self, fault: str) -> None:
+        self._stopped = True
+        self.fault = f"{fault}; " + (f"recorded up to tick {self.kept}" if self.kept >= 0 else "nothing is recorded")
+
+    def _tell(self, text: str) -> None:
+        warn(text)
+        self.translator.event(text)
 
 
 def fresh_file(wanted: Path) -> Path:
-    """`wanted`, or the same with -2, -3, … where a file stands already: no recording is overwritten.
-
-    The file is made here, empty, so that of recorders that start at the same moment each has its own.
-    """
-    file, number = wanted, 1
-    while True:
-        try:
+    """Make `wanted`, or the same with -2, -3, … where a file stands already: no recording is overwritten."""
+    for number in count(1):
+        file = wanted if number == 1 else wanted.with_name(f"{wanted.stem}-{number}{wanted.suffix}")
+        with suppress(FileExistsError):
             file.touch(exist_ok=False)
             return file
-        except FileExistsError:
-            number += 1
-            file = wanted.with_name(f"{wanted.stem}-{number}{wanted.suffix}")
+    raise AssertionError
 
 
 def complete(file: Path) -> None:
-    """Give a closed recording its footer and larger chunks, so that it opens fast; a large one stays as it is."""
-    if not file.exists() or file.stat().st_size > LARGE:
+    """Give a closed recording its footer and larger chunks, so that it opens fast.
+
+    A large one stays as it is, and so does one that would not fit a second time onto its disk.
+    """
+    try:
+        size, free = file.stat().st_size, shutil.disk_usage(file.parent).free
+    except FileNotFoundError:
+        return
+    if size > min(LARGE, free):
         return
     part = file.with_suffix(".part")
     command = [rerun_program(), "rrd", "optimize", file, "-o", part]

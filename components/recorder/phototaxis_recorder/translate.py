@@ -96,6 +96,7 @@ class Translator:
         agent = self._take("agent", until)
         if rows := self._take("sim", until):
             tick, x, y, heading = rows
+            self.summary.tick = int(tick[-1])
             place = np.stack([x, y, np.zeros_like(x)], axis=1)
             turn = np.zeros((len(tick), 4))
             turn[:, 2], turn[:, 3] = np.sin(heading / 2), np.cos(heading / 2)
@@ -136,7 +137,6 @@ class Translator:
             rr.log("plots/success/rate", rr.Scalars(rate), recording=self._recording)
             rr.log("plots/success/paper", rr.Scalars(PAPER), recording=self._recording)
         self._episodes.clear()
-        self.summary.tick = max(self._newest["sim"], self.summary.tick)
         self.summary.epochs = max(self.summary.tick - self.summary.episodes, 0)
 
     def behind(self) -> list[str]:

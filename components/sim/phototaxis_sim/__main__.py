@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
+from phototaxis.disk import try_file
 from phototaxis.errors import UserError
 from phototaxis.journal import Journal
 from phototaxis.messages import MOST, Count, Seed, run_name
@@ -48,6 +49,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     if options.robots > 1 and options.restarted:
         raise UserError("a simulation of many robots that died is not continued; start the run again")
     journal = Journal(Path(options.journal)) if options.journal and options.robots == 1 else None
+    if journal is not None:
+        try_file(journal.path, "--journal")
 
     def serve(bus: Bus) -> None:
         pace = Pace(arena.motion.control_period, options.speed)

@@ -11,9 +11,10 @@ import msgspec
 from phototaxis.bus import Bus, Event
 from phototaxis.chunks import Chunks
 from phototaxis.codec import Refused
-from phototaxis.errors import UserError
-from phototaxis.journal import Journal
-from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, Phase, SimLog, State, Status
+from phototaxis.disk import unwritten
+from phototaxis.errors import Unavailable, UserError, warn
+from phototaxis.journal import GIVEN_UP, Journal
+from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, Phase, Recorded, SimLog, State, Status
 from phototaxis.protocol import Question
 
 from phototaxis_sim.lateness import Lateness
@@ -42,8 +43,16 @@ class Server:
     """Drives a `Simulation` by the answers that come from the bus.
 
     With a journal that holds the same run, it continues where that run was killed: the episode's start
-    is restored and its commands are made again. A driver that is there but has not answered for `patience`
-    seconds loses the seat if somebody else waits for it.
+    is restored and its commands are made again. A journal that cannot be written is given up until the next
+    episode; the run goes on, and the status warns that it could not be continued. A driver that is there but
+    has not answered for `patience` seconds loses the seat if somebody else waits for it.
+
+    Raises
+    ------
+    UserError
+        when the journal is not one of a simulation.
+    Unavailable
+        when it cannot be begun, or was given up before the simulation died.
     """
 
     def __init__(
@@ -71,6 +80,9 @@ class Server:
         self._started: tuple[float, int] | None = None
         self._mean_rate = 0.0
         self._ended: list[Any] = []
+        self._unkept = ""
+        """That the journal is given up, and why."""
+        self._recorded: Recorded | None = None
         self._log = Chunks(bus, "log/sim", self._chunk)
         self._seat = Seat()
         self._lateness, self._told = Lateness(), ""
@@ -118,6 +130,8 @@ class Server:
             event.reply(self._sim.world)
         elif event.topic == "log/sim":
             self._log.answer(event)
+        elif event.topic == "recording":
+            self._recorded = event.message
         elif event.topic == "alive":
             self._alive.add("/".join(event.message))
         elif event.topic == "gone":
@@ -192,12 +206,12 @@ class Server:
         self._pace.begun(now)
 
     def _apply(self, entry: Entry) -> None:
-        if self._journal is not None and not entry.end:
-            self._journal.append(msgspec.msgpack.encode(entry))
+        if not entry.end:
+            self._keep(entry)
         before = self._sim.watched
         self._advance(entry)
-        if self._journal is not None and entry.end:
-            self._journal.begin(self._header())
+        if entry.end:
+            self._keep_from_here()
         self._seat.boundary(self._sim.state.tick)
         self._ask()
         self._record(before)  # while the others compute
@@ -275,8 +289,7 @@ class Server:
         self._recent.clear()
         self._ended.clear()
         self._rate_at = self._rate = self._mean_rate = 0.0
-        if self._journal is not None:
-            self._journal.begin(self._header())
+        self._keep_from_here()
         self._ask()
 
     def _reseat(self, request: Control) -> str:
@@ -320,8 +333,13 @@ class Server:
             rate=self._rate, mean_rate=self._mean_rate, driver=self._seat.driver, drivers=self._seat.history,
             next=self._seat.waiting, alive=sorted(self._alive),
             late=self._lateness.ticks, late_sensors=self._lateness.unsensed, too_slow=self._too_slow(),
-            refused=dict(self._bus.refused), hash=state.hash,
+            refused=dict(self._bus.refused), hash=state.hash, warnings=self._warnings(),
         )  # fmt: skip
+
+    def _warnings(self) -> list[str]:
+        recorded = self._recorded
+        unrecorded = recorded.fault if recorded is not None and recorded.run == self._sim.world.run else ""
+        return [fault for fault in (self._unkept, unrecorded) if fault]
 
     def _announce(self, now: float) -> None:
         if now - self._rate_at >= 1.0:
@@ -356,23 +374,55 @@ class Server:
     def _header(self) -> bytes:
         return msgspec.msgpack.encode(self._sim.snapshot(list(self._recent), self._seat.driver))
 
+    def _keep(self, entry: Entry) -> None:
+        """Add to the journal, unless it is given up."""
+        if self._journal is None or not self._journal.kept:
+            return
+        try:
+            self._journal.append(msgspec.msgpack.encode(entry))
+        except OSError as error:
+            self._give_up(self._journal, error)
+
+    def _keep_from_here(self) -> None:
+        """Begin the journal anew with the episode, also one that was given up."""
+        if self._journal is None:
+            return
+        try:
+            self._journal.begin(self._header())
+            self._unkept = ""
+        except OSError as error:
+            self._give_up(self._journal, error)
+
+    def _give_up(self, journal: Journal, error: OSError) -> None:
+        journal.give_up()
+        self._unkept = f"{unwritten(journal.path, error)}; a simulation that dies in this episode cannot be continued"
+        warn(self._unkept)
+
     def _continue(self, journal: Journal) -> str:
         """Restore what the journal holds of this run, or begin a new journal; who drove last."""
         frames = journal.read()
-        snapshot = msgspec.msgpack.decode(frames[0], type=Snapshot) if frames else None
+        try:
+            snapshot = msgspec.msgpack.decode(frames[0], type=Snapshot) if frames else None
+        except msgspec.MsgspecError:
+            raise UserError(f"{journal.path}: not the journal of a simulation; name another file") from None
         if snapshot is not None and re.fullmatch(re.escape(self._root) + r"\.[0-9a-f]{4}", snapshot.run):
             self._sim = self._sim.anew(snapshot.seed, snapshot.run)  # it was begun later, by request
-        if snapshot is None or snapshot.run != self._sim.world.run:
-            journal.begin(self._header())
-            return ""
-        if snapshot.arena != self._sim.digest:
+        if snapshot is not None and snapshot.run == self._sim.world.run and snapshot.arena != self._sim.digest:
             raise UserError(f"the run {snapshot.run} began in another arena than '{self._sim.world.arena.name}' is now")
+        try:
+            if snapshot is None or snapshot.run != self._sim.world.run:
+                journal.begin(self._header())
+                return ""
+            if GIVEN_UP in frames:
+                line = "could not be written to its end; the run cannot be continued, begin a new one"
+                raise Unavailable(f"{journal.path}: {line}")
+            journal.resume(frames)
+        except OSError as error:
+            raise unwritten(journal.path, error) from None
         self._sim.restore(snapshot)
         self._recent.extend(snapshot.recent)
-        journal.begin(frames[0])
         driver = snapshot.driver
         for frame in frames[1:]:
-            journal.append(frame)
             self._record(self._sim.state)
             entry = msgspec.msgpack.decode(frame, type=Entry)
             self._advance(entry)

@@ -1,6 +1,7 @@
 """The figures: readable in print, and without colour."""
 
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
+from phototaxis.disk import write_whole
 from phototaxis.task import ACTIONS
 
 from phototaxis_lab.cell import CURVE, Outcome
@@ -128,4 +130,6 @@ def _legend_below(axes: Axes) -> None:
 
 
 def _save(figure: Figure, path: Path) -> None:
-    figure.savefig(path, metadata={"Software": None})
+    drawn = BytesIO()
+    figure.savefig(drawn, format="png", metadata={"Software": None})
+    write_whole(path, drawn.getvalue())

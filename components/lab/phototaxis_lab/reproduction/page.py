@@ -6,6 +6,7 @@ from string import Template
 
 import msgspec
 import numpy as np
+from phototaxis.disk import write_whole
 from phototaxis.task import FORWARD, PERCEPTS
 from phototaxis_sim import arenas
 
@@ -35,7 +36,7 @@ def write(folder: Path, data: Data, seeds: range) -> None:
         shadows=systems_table(SHADOWS, data, fixed["shadows"]),
         hyperparameters=hyperparameters(),
     )
-    (folder / "README.md").write_text(text, encoding="utf-8")
+    write_whole(folder / "README.md", text.encode())
 
 
 def controllers(name: str, seeds: range) -> dict[str, list[Evaluation]]:

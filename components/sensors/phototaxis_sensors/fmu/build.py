@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal
 
+from phototaxis.disk import try_file, write_whole
 from phototaxis.errors import UserError
 
 from phototaxis_sensors.fmu.examples import FOLDER, Example, Variable
@@ -29,6 +30,7 @@ def build(example: Example, version: Version, file: Path, sources_only: bool = F
     UserError
         when the file cannot be written, or there is no C compiler.
     """
+    try_file(file, "--output")
     with TemporaryDirectory(prefix="phototaxis-fmu-") as folder:
         tree = Path(folder) / "fmu"
         sources = tree / "sources"
@@ -44,10 +46,7 @@ def build(example: Example, version: Version, file: Path, sources_only: bool = F
         archive = Path(shutil.make_archive(str(Path(folder) / "packed"), "zip", tree))
         if not sources_only:
             compile_sources(archive)
-        try:
-            shutil.copyfile(archive, file)
-        except OSError as error:
-            raise UserError(f"{file}: {error.strerror}") from None
+        write_whole(file, archive.read_bytes())
 
 
 def compiled(file: Path) -> bytes:
