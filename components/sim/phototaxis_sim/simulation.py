@@ -40,6 +40,7 @@ class Simulation:
     seed : decides where each episode starts, as a pure function of (seed, episode).
     run : name of the run; has no influence on the trajectory.
     epochs : motor commands after which the run is finished; 0 for no end.
+    start : pose at which the first episode starts in place of the seed's.
 
     Attributes
     ----------
@@ -49,7 +50,7 @@ class Simulation:
         the episode that ended in the last `advance`.
     """
 
-    def __init__(self, arena: Arena, seed: int, run: str, epochs: int = 0):
+    def __init__(self, arena: Arena, seed: int, run: str, epochs: int = 0, start: Pose | None = None):
         self.world = World(run, arena, seed, epochs)
         self.ended: Episode | None = None
         self.episodes = self.reached = 0
@@ -58,7 +59,7 @@ class Simulation:
         self._tick = self._episode = self._epoch = self._steps = 0
         self._chain = b"\0" * 8
         self._start = Pose(0, 0, 0)
-        self.state = self._begin()
+        self.state = self._begin(start)
 
     @property
     def finished(self) -> bool:
@@ -82,8 +83,11 @@ class Simulation:
         """Another run in the same arena."""
         return Simulation(self.world.arena, seed, run, self.world.epochs)
 
-    def advance(self, left: float, right: float, author: str, end: End = "") -> State:
-        """Hold a command for one control period, or end the episode; the next state."""
+    def advance(self, left: float, right: float, author: str, end: End = "", start: Pose | None = None) -> State:
+        """Hold a command for one control period, or end the episode; the next state.
+
+        The next episode starts at `start` if it is given, else where the seed says.
+        """
         self.ended = None
         self._tick += 1
         if end:
@@ -92,7 +96,7 @@ class Simulation:
             self.reached += end == "reached"
             self._episode += 1
             self._steps = 0
-            self.state = self._begin()
+            self.state = self._begin(start)
         else:
             self._epoch += 1
             self._steps += 1
@@ -114,16 +118,19 @@ class Simulation:
             driver,
         )
 
-    def restore(self, at: Snapshot) -> None:
-        """Go to the first tick of an episode; the same commands then lead to the same states."""
+    def restore(self, at: Snapshot, start: Pose | None = None) -> None:
+        """Go to the first tick of an episode; the same commands then lead to the same states.
+
+        `start` is the pose that was given for the episode, if one was.
+        """
         self._tick, self._episode, self._epoch, self._steps = at.tick, at.episode, at.epoch, 0
         self.episodes, self.reached, self._chain = at.episodes, at.reached, at.chain
-        self.state = self._begin()
+        self.state = self._begin(start)
 
-    def _begin(self) -> State:
+    def _begin(self, start: Pose | None) -> State:
         self._before = self._chain
         rng = np.random.default_rng((self.world.seed, self._episode))
-        self._start = self._physics.random_pose(rng)
+        self._start = self._physics.random_pose(rng) if start is None else start
         return self._report(self._physics.place(self._start), 0.0, 0.0, "")
 
     def _report(self, motion: Motion, left: float, right: float, author: str) -> State:
