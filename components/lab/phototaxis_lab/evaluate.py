@@ -1,4 +1,4 @@
-"""`phototaxis evaluate`: measure the policy in a checkpoint."""
+"""`phototaxis evaluate`: measure the policy in a checkpoint, or in a file of Stable-Baselines3."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,15 +17,19 @@ class Options(Struct, kw_only=True):
     """Options of `phototaxis evaluate`."""
 
     checkpoint: str
-    """checkpoint (.npz) whose policy is measured"""
+    """checkpoint (.npz) whose policy is measured, or a policy (.zip) that Stable-Baselines3 has saved"""
     placements: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
     """fresh random placements"""
     seed: Seed = 1
     """decides the placements and the policy's draws; never those of a training"""
     arena: str = ""
-    """another arena than the one of the training"""
+    """another arena than the one of the training (which a .zip does not name: then paper)"""
     cap: Annotated[int, Meta(ge=1)] = 300
     """steps after which a placement counts as failed"""
+    trust: bool = False
+    """load a .zip although such a file can run any code: you trust who made it"""
+    normalize: str = ""
+    """statistics of a .zip's observations: the file (.pkl) that VecNormalize.save has written"""
     json: bool = False
     """print the result as one JSON object"""
 
@@ -34,13 +38,22 @@ def main(argv: Sequence[str]) -> int:
     about = "Freeze the policy of a checkpoint and measure it on fresh random placements."
     groups = {"": Options, "sensor models": FmuOptions}
     options, fmus = parse_groups(groups, argv, "phototaxis evaluate", about, positional=["checkpoint"])
+    from phototaxis_agent.policies import is_policy, load_policy
     from phototaxis_agent.setup import from_checkpoint
     from phototaxis_sensors.choice import choose
     from phototaxis_sim import arenas
 
-    from phototaxis_lab.measure import SEED_OFFSET, describe, evaluate
+    from phototaxis_lab.measure import SEED_OFFSET, describe, evaluate, measure
 
     path = Path(options.checkpoint)
+    if is_policy(path):
+        with choose(fmus) as sensors:
+            arena, policy = arenas.load(options.arena or "paper"), load_policy(path, options.trust, options.normalize)
+            found = measure(arena, policy.crowd(arena), options.placements, options.seed, options.cap, sensors)
+        print(msgspec.json.encode(found).decode() if options.json else describe(found))
+        return 0
+    if options.normalize:
+        raise UserError(f"{path}: --normalize belongs to a policy that Stable-Baselines3 has saved (.zip)")
     meta, arrays = load(path)
     if not options.arena and meta.arena not in arenas.shipped():
         raise UserError(f"{path}: learned in the arena '{meta.arena}', which is not shipped; give its file: --arena")
