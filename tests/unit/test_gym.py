@@ -25,15 +25,6 @@ PERCEPTS = ("simple", "rich", "continuous", "sensors")
 VARIANTS = [(percept, action) for percept in PERCEPTS for action in ("discrete", "continuous")]
 
 
-@pytest.fixture
-def quiet(tmp_path):
-    """The paper's arena without noise."""
-    text = (Path(arenas.__file__).parent / "arenas/paper.toml").read_text()
-    file = tmp_path / "quiet.toml"
-    file.write_text(text.replace("noise = 0.05", "noise = 0.0"))
-    return str(file)
-
-
 @pytest.mark.parametrize(("percept", "action"), VARIANTS)
 def test_the_checkers_find_nothing(percept, action, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
@@ -179,7 +170,7 @@ def test_one_robot_has_the_render_modes_that_it_says():
         LightSeeker(render_mode="ansi")
 
 
-@pytest.mark.parametrize("seed", [[1, 2], [1, -2, 3], [1, 2, 3, 4]])
+@pytest.mark.parametrize("seed", [[1, 2], [1, 2, 3, 4]])
 def test_many_robots_take_one_seed_each(seed):
     with pytest.raises(Error, match="one number, or one for each of the 3 robots"):
         gymnasium.make_vec(NAME, num_envs=3).reset(seed=seed)

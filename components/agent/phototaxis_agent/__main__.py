@@ -1,9 +1,7 @@
 """`phototaxis agent`: a learner as a process."""
 
-from collections.abc import Callable, Sequence
-from importlib.metadata import entry_points
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
@@ -13,6 +11,7 @@ from phototaxis.messages import Count, Seed, World
 from phototaxis.session import WorldNames
 
 from phototaxis_agent.agent import Agent
+from phototaxis_agent.policies import load_policy
 from phototaxis_agent.server import Mode, Server
 from phototaxis_agent.setup import parse_setup
 
@@ -36,33 +35,10 @@ class Options(ComponentOptions, kw_only=True):
     """a frozen policy in the place of a learner: a file (.zip) that Stable-Baselines3 has saved"""
     trust: bool = False
     """load the policy although such a file can run any code: you trust who made it"""
+    normalize: str = ""
+    """statistics of the policy's observations: the file (.pkl) that VecNormalize.save has written"""
     agent_seed: Seed | None = None
     """seed of the learner and its exploration (default: the run's)"""
-
-
-POLICIES = "phototaxis.policies"
-
-
-def policy_loader(file: Path, trusted: bool) -> Callable[[World, int], Any]:
-    """Makes the agent for a policy file, by the entry point that is called as its suffix.
-
-    Raises
-    ------
-    UserError
-        when there is none, what it needs is not installed, or the file cannot be loaded.
-    """
-    points = {point.name: point for point in entry_points(group=POLICIES)}
-    point = points.get(file.suffix.removeprefix("."))
-    if point is None:
-        raise UserError(f"--policy {file}: no policies of the kind '{file.suffix}'; there are: .{', .'.join(points)}")
-    try:
-        kind = point.load()
-    except ModuleNotFoundError as error:
-        line = (
-            f"--policy needs the package {error.name}; install it with: pip install 'phototaxis[gym]' stable-baselines3"
-        )
-        raise UserError(line) from None
-    return kind(file, trusted)
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -78,7 +54,9 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     if options.policy and (options.checkpoint or options.resume):
         raise UserError("--policy learns nothing: leave --checkpoint and --resume out")
-    load = policy_loader(Path(options.policy), options.trust) if options.policy else None
+    if options.normalize and not options.policy:
+        raise UserError("--normalize belongs to a policy: give its file, too: --policy FILE.zip")
+    load = load_policy(Path(options.policy), options.trust, options.normalize) if options.policy else None
 
     def make(world: World) -> Agent:
         return load(world, setup.task.cap) if load else setup.agent(world, seed=options.agent_seed)

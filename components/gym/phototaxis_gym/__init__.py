@@ -7,10 +7,11 @@ Importing this registers them. Gymnasium does so itself when the name says where
 import gymnasium
 
 CAP = 300
-"""Steps after which an episode is truncated."""
+"""Steps after which an episode is truncated, unless `max_episode_steps` says otherwise."""
 
 gymnasium.register(
     "phototaxis/LightSeeker-v0",
     entry_point="phototaxis_gym.single:LightSeeker",
     vector_entry_point="phototaxis_gym.vector:LightSeekers",
+    max_episode_steps=CAP,
 )

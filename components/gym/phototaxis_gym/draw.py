@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from phototaxis.arena import Arena
@@ -12,11 +13,16 @@ SIDE = 480
 PAPER, INK, STONE, YELLOW, BLUE, RAY = "#f6f6f3", "#3c3c3c", "#787878", "#f0b400", "#145aaa", "#b4c8dc"
 
 
-class Canvas:
-    """Draws robot and rays into a picture of what does not move."""
+def frame_rate(arena: Arena) -> float:
+    """Frames a second at which a film of one frame a step runs in real time."""
+    return 1 / arena.motion.control_period
 
-    def __init__(self, arena: Arena):
-        self._arena, self._scale = arena, SIDE / max(arena.size)
+
+class Canvas:
+    """Draws robot and rays into a picture of what does not move, `side` pixels long."""
+
+    def __init__(self, arena: Arena, side: int = SIDE):
+        self._arena, self._scale = arena, side / max(arena.size)
         self._mounts = [(sonar.position, sonar.angle) for sonar in arena.robot.sonars]
         width, height = (round(self._scale * side) for side in arena.size)
         self._still = Image.new("RGB", (width, height), PAPER)
@@ -43,7 +49,7 @@ class Canvas:
         draw.polygon([self._on(pose, corner) for corner in ((x, y), (-x, y), (-x, -y), (x, -y))], BLUE)
         for sensor in robot.light_sensors:
             draw.circle(self._on(pose, sensor), 2, YELLOW)
-        return np.asarray(picture)
+        return np.array(picture)
 
     def _on(self, pose: tuple[float, float, float], point: tuple[float, float]) -> tuple[float, float]:
         """A point of the robot's frame, in pixels."""
@@ -55,13 +61,20 @@ class Canvas:
         return x * self._scale, (self._arena.size[1] - y) * self._scale
 
 
-class Window:
-    """A window on the screen."""
+def tiles(pictures: Sequence[np.ndarray]) -> np.ndarray:
+    """Pictures of one size as one picture, row by row, as square as can be."""
+    columns = math.ceil(math.sqrt(len(pictures)))
+    blank = np.zeros_like(pictures[0])
+    padded = [*pictures, *[blank] * (-len(pictures) % columns)]
+    return np.vstack([np.hstack(padded[row : row + columns]) for row in range(0, len(padded), columns)])
 
-    def __init__(self, fps: int):
+
+class Window:
+    """A window on the screen; opens with its first picture, and again with the first one after `close`."""
+
+    def __init__(self, fps: float):
         import pygame
 
-        pygame.display.init()
         self._pygame, self._fps, self._clock = pygame, fps, pygame.time.Clock()
         self._surface = None
 
@@ -69,6 +82,7 @@ class Window:
         """Show a picture, at the pace of a film."""
         pygame = self._pygame
         if self._surface is None:
+            pygame.display.init()
             self._surface = pygame.display.set_mode((picture.shape[1], picture.shape[0]))
             pygame.display.set_caption("Phototaxis")
         pygame.surfarray.blit_array(self._surface, picture.transpose(1, 0, 2))
@@ -77,4 +91,10 @@ class Window:
         self._clock.tick(self._fps)
 
     def close(self) -> None:
-        self._pygame.display.quit()
+        if self._surface is not None:
+            self._surface = None
+            self._pygame.display.quit()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy has a window of its own."""
+        return Window, (self._fps,)

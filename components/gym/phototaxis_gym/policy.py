@@ -1,83 +1,113 @@
 """A policy that Stable-Baselines3 has learned, in the driver's seat: frozen, and an agent like others."""
 
-import json
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from phototaxis.arena import Arena
-from phototaxis.checkpoint import Meta
+from phototaxis.checkpoint import Meta, learner_hash
 from phototaxis.errors import UserError
 from phototaxis.messages import Command, End, Readings, World
 from phototaxis.options import convert
-from phototaxis.task import ACTIONS, Memory, TaskOptions, lit
+from phototaxis.task import ACTIONS, CrowdReadings, Memory, TaskOptions, lit
 
+from phototaxis_gym.policy_file import Normalize, load, normalizer, was_normalized
 from phototaxis_gym.spaces import MOTORS, observation, rewards
 
 PERCEPTS = ("simple", "rich", "continuous", "sensors")
 _INDEX = {motors: index for index, motors in enumerate(ACTIONS)}
 
 
-def load(file: Path, trusted: bool) -> Any:
-    """The model in a file of Stable-Baselines3.
+class Policy:
+    """A frozen policy for N robots: from what they sense to their motor commands, as it was trained.
+
+    Which percept and which actions it has follows from the model's spaces. A recurrent policy has a memory, which is
+    begun anew with each robot's episode.
 
     Raises
     ------
     UserError
-        when the file is not trusted, not such a file, or Stable-Baselines3 is not installed.
+        when the spaces are none of ours, or the observations were normalised and `normalize` is None.
     """
-    try:
-        with zipfile.ZipFile(file) as archive:
-            data = json.loads(archive.read("data"))
-            module = str(data["policy_class"]["__module__"])
-    except FileNotFoundError:
-        raise UserError(f"{file}: there is no such file") from None
-    except (zipfile.BadZipFile, zlib.error, RuntimeError, OSError, KeyError, TypeError, ValueError):
-        raise UserError(f"{file}: not a policy that Stable-Baselines3 has saved") from None
-    if not trusted:
-        raise UserError(
-            f"{file}: a file of Stable-Baselines3 can run any code when it is loaded; "
-            f"if you trust who made it, add --trust"
-        )
-    try:
-        import stable_baselines3 as sb3
-    except ModuleNotFoundError as error:
-        raise UserError(f"{file} needs the package {error.name}: pip install stable-baselines3") from None
-    by_module = {"dqn": sb3.DQN, "sac": sb3.SAC, "td3": sb3.TD3}
-    found = by_module.get(module.split(".")[1] if "." in module else "")
-    algorithm = found or (sb3.PPO if "clip_range" in data else sb3.A2C)
-    try:
-        return algorithm.load(file, device="cpu")
-    except Exception as error:  # whatever a pickle does
-        raise UserError(f"{file}: cannot be loaded: {type(error).__name__}: {error}") from None
+
+    def __init__(self, model: Any, file: Path, arena: Arena, normalize: Normalize | None = None):
+        space = model.observation_space
+        self.percept = next((name for name in PERCEPTS if observation(name, arena).space == space), "")
+        self._discrete = model.action_space == spaces.Discrete(len(ACTIONS))
+        if not self.percept or not (self._discrete or model.action_space == spaces.Box(-1.0, 1.0, (2,), np.float32)):
+            theirs = f"observes {short(space)} and acts in {model.action_space}"
+            raise UserError(f"{file}: {theirs}: not the spaces of an environment of phototaxis{wrapped(space, arena)}")
+        if normalize is None and was_normalized(model):
+            raise UserError(
+                f"{file}: it was trained through VecNormalize and needs its statistics; give the file that "
+                f"VecNormalize.save has written: --normalize FILE.pkl"
+            )
+        self._model, self._file, self._normalize = model, file, normalize
+        self._observe, self._dtype = observation(self.percept, arena), space.dtype
+        self.memory: tuple[np.ndarray, ...] | None = None
+
+    def __call__(self, senses: Any, history: Memory, starts: np.ndarray) -> np.ndarray:
+        """(N, 2): the motor commands; `starts` (N,) says whose episode begins."""
+        seen = np.asarray(self._observe(senses, history), self._dtype)
+        seen = seen.reshape(len(starts), *self._model.observation_space.shape)
+        if self._normalize is not None:
+            seen = self._normalize(seen)
+        chosen, self.memory = self._model.predict(seen, self.memory, episode_start=starts, deterministic=True)
+        return MOTORS[chosen] if self._discrete else np.asarray(chosen, float)
+
+    def remember(self, arrays: dict[str, np.ndarray], source: str) -> None:
+        """Take over the memory of another one with the same policy.
+
+        Raises
+        ------
+        UserError
+            when it has another shape; `source` names it.
+        """
+        memory = tuple(arrays[name] for name in sorted(arrays)) or None
+        shape = getattr(self._model.policy, "lstm_hidden_state_shape", None)
+        if memory and any(part.shape != tuple(shape or ()) for part in memory):
+            raise UserError(f"{source}: its memory does not fit the policy in {self._file}")
+        self.memory = memory
+
+
+def short(space: Any) -> str:
+    """A space in a few words: the bounds of a long vector are left out."""
+    words = str(space)
+    return words if len(words) < 80 else f"{type(space).__name__} of the shape {space.shape}"
+
+
+def wrapped(space: Any, arena: Arena) -> str:
+    """Which wrapper may have made these observations from ours; empty when none is known."""
+    shape = getattr(space, "shape", None) or ()
+    for name in PERCEPTS:
+        ours = observation(name, arena).space
+        if not isinstance(ours, spaces.Box) or not isinstance(space, spaces.Box) or not shape:
+            continue
+        count = int(np.prod(shape))
+        (size,) = ours.shape
+        if shape[-1] % size == 0 and count > size:
+            return f" ({count // size} frames of {name} stacked? policies of stacked frames are not supported)"
+        if shape == ours.shape and not np.isfinite(space.high).all():
+            return f" ({name} through NormalizeObservation? train through VecNormalize, whose statistics can be saved)"
+    return ""
 
 
 class PolicyAgent:
     """Turns readings into the commands of a frozen policy; has what the agent's process asks of an `Agent`.
 
-    Which percept and which actions it has follows from the policy's spaces.
-
     Raises
     ------
     UserError
-        when they are none of ours.
+        as in `Policy`.
     """
 
-    def __init__(self, model: Any, file: Path, world: World, cap: int):
+    def __init__(self, model: Any, file: Path, world: World, cap: int, normalize: Normalize | None = None):
         self.name = self.author = f"policy-{file.stem}"
-        near = world.arena
-        self.enter(near)
-        self._model = model
-        percept = next((name for name in PERCEPTS if observation(name, near).space == model.observation_space), "")
-        discrete = model.action_space == spaces.Discrete(len(ACTIONS))
-        if not percept or not (discrete or model.action_space == spaces.Box(-1.0, 1.0, (2,), np.float32)):
-            theirs = f"observes {model.observation_space} and acts in {model.action_space}"
-            raise UserError(f"{file}: {theirs}: not the spaces of an environment of phototaxis")
-        self._observe, self._reward = observation(percept, near), rewards("own", percept)
-        self._discrete, self._percept, self._cap = discrete, percept, cap
+        self.enter(world.arena)
+        self._policy, self._cap = Policy(model, file, world.arena, normalize), cap
+        percept = self._policy.percept
+        self._reward = rewards("own", percept)
         self.task = convert(TaskOptions, {"percept": "continuous" if percept == "sensors" else percept, "cap": cap})
         self._memory = Memory()
         self._run, self._tick, self._episode, self._steps = "", -1, -1, 0
@@ -93,6 +123,7 @@ class PolicyAgent:
         """Answer one tick."""
         if readings.run != self._run or readings.episode != self._episode or readings.tick != self._tick + 1:
             self._memory.clear()
+            self._policy.memory = None
             self._run, self._episode, self._steps = readings.run, readings.episode, -1
         self._tick, self._steps = readings.tick, self._steps + 1
         memory = self._memory
@@ -101,8 +132,7 @@ class PolicyAgent:
         end: End = "reached" if lit(readings) else "cap" if self._steps >= self._cap else ""
         action, left, right = -1, 0.0, 0.0
         if not end:
-            chosen, _ = self._model.predict(np.asarray(self._observe(readings, memory)), deterministic=True)
-            left, right = map(float, MOTORS[int(chosen)] if self._discrete else chosen)
+            ((left, right),) = self._policy(readings, memory, np.array([self._steps == 0])).tolist()
             action = _INDEX.get((left, right), -1)
         self.last = (0, action, reward, 0.0, 0.0)
         self.command = Command(readings.run, readings.tick, self.author, left, right, end)
@@ -123,31 +153,51 @@ class PolicyAgent:
 
     def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
         """Where it is in its episode, for a successor with the same policy; the policy itself is in its file."""
-        command = self.command
+        command, arrays = self.command, {f"memory_{at}": part for at, part in enumerate(self._policy.memory or ())}
         meta = Meta(
             learner=self.name, percept=self.task.percept, reward="own", cap=self._cap, hyperparameters={},
             exploration={}, budget=0, run=self._run, tick=self._tick, episode=self._episode, epoch=0, steps=self._steps,
             lights=list(self._memory.lights), state=(), linked=False,
             answer=None if command is None else (command.left, command.right, command.end),
-            random={}, visits=[], arena=self.arena, arena_digest=self.arena_digest, learner_hash="",
+            random={}, visits=[], arena=self.arena, arena_digest=self.arena_digest,
+            learner_hash=learner_hash(arrays),
         )  # fmt: skip
-        return meta, {}
+        return meta, arrays
 
     def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
         """Continue where another one with the same policy is."""
+        self._policy.remember(arrays, source)
         self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
         self._memory.clear()
         self._memory.lights.extend(meta.lights)
         self.command = None if meta.answer is None else Command(meta.run, meta.tick, self.author, *meta.answer)
 
 
-class PolicyFile:
-    """Loads a policy at once, and makes agents of it."""
+class PolicyCrowd:
+    """Drives N robots through one episode each, all of which begin at the same tick."""
 
-    def __init__(self, file: Path, trusted: bool):
+    def __init__(self, policy: Policy):
+        self._policy, self._memory = policy, Memory()
+
+    def __call__(self, readings: CrowdReadings) -> np.ndarray:
+        """The motor commands (N, 2) of one tick."""
+        starts = np.full(len(readings.front), not self._memory.lights)
+        self._memory.see(readings)
+        return self._policy(readings, self._memory, starts)
+
+
+class PolicyFile:
+    """Loads a policy at once, with the statistics of its observations, and makes agents of it."""
+
+    def __init__(self, file: Path, trusted: bool, normalize: Path | None = None):
         self._file, self._model = file, load(file, trusted)
+        self._normalize = None if normalize is None else normalizer(normalize, trusted, self._model)
 
     def __call__(self, world: World, cap: int) -> PolicyAgent:
         if world.robots > 1:
             raise UserError(f"{self._file}: a policy drives one robot; this world has {world.robots}")
-        return PolicyAgent(self._model, self._file, world, cap)
+        return PolicyAgent(self._model, self._file, world, cap, self._normalize)
+
+    def crowd(self, arena: Arena) -> PolicyCrowd:
+        """What drives many robots in an evaluation."""
+        return PolicyCrowd(Policy(self._model, self._file, arena, self._normalize))

@@ -2,24 +2,25 @@
 
 import time
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any, Literal
 
-import msgspec
 import numpy as np
-from gymnasium.error import Error
+from gymnasium.error import ClosedEnvironmentError, Error, ResetNeeded
 from phototaxis.bus import Bus, Event
 from phototaxis.codec import Refused
 from phototaxis.columns import FLAG, pack, unpack
 from phototaxis.component import made_up
 from phototaxis.errors import UserError
-from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, Seed, World
+from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, World
 from phototaxis.options import convert
 from phototaxis.session import BusOptions, open_session
 from phototaxis.task import CrowdReadings
+from phototaxis_sim.physics import Pose
 
 SEEK_EVERY = 0.2
+FOLLOW = "behind the bus the robots' seeds are S, S + 1, S + 2, …"
 
 
 class Link:
@@ -73,16 +74,19 @@ class Link:
         """Our name on the bus."""
         return self._bus.ident
 
+    @property
+    def tick(self) -> int:
+        """Of the newest readings."""
+        return self._now.tick
+
     def begin(self, seed: int) -> Any:
         """The first readings of a run with this seed; whoever drives is asked to hand over first."""
-        try:
-            msgspec.convert(seed, Seed)
-        except msgspec.ValidationError as error:
-            raise Error(f"seed {seed}: {error}") from None
+        self._check_open()
         self._sit()
         reply = self._bus.control(Control("begin", self.ident, seed=seed), timeout=self._timeout)
         if reply is None or not reply.ok:
             raise Error(f"{self._where} does not begin anew: {reply.reason if reply else 'no answer'}")
+        self._now = None
         self._now = self._hear(lambda readings: readings.run == reply.status.run)
         return self._now
 
@@ -92,8 +96,9 @@ class Link:
         In lockstep those are the next tick's. In real time the world does not wait: what came while nobody was
         listening is passed over, and an answer that came late is given again.
         """
-        if self._now is None or not self._closing.alive:
-            raise Error("the environment is closed" if self._now else "reset() comes before step()")
+        self._check_open()
+        if self._now is None:
+            raise ResetNeeded("reset(seed=…) comes first")
         self._catch_up()
         before, topic = self._now, f"{self._prefix}command"
         command = make(before.run, before.tick)
@@ -109,6 +114,16 @@ class Link:
         if self._closing.alive:
             self._bus.control(Control("release", self.ident), timeout=0.5)
             self._closing()
+
+    def __reduce__(self) -> Any:
+        raise TypeError(
+            f"an environment of {self._where} cannot be copied or pickled: it holds the driver's seat there, and there "
+            f"is one; make another, or one without connect"
+        )
+
+    def _check_open(self) -> None:
+        if not self._closing.alive:
+            raise ClosedEnvironmentError("the environment is closed; make another one")
 
     def _catch_up(self) -> None:
         """The newest readings that have come."""
@@ -134,7 +149,10 @@ class Link:
         otherwise: Callable[[Any], object] = lambda _: None,
         seated: bool = True,
     ) -> Any:
-        """The first readings that are wanted; what else comes goes to `otherwise`."""
+        """The first readings that are wanted; what else comes goes to `otherwise`.
+
+        Once a run is under way, one that somebody else began in its place is an error.
+        """
         deadline = time.monotonic() + self._timeout
         while (left := deadline - time.monotonic()) > 0:
             event = self._bus.receive(timeout=left)
@@ -143,15 +161,35 @@ class Link:
                 readings = event.message
                 if seated and readings.driver not in ("", self.ident):
                     raise Error(f"{readings.driver} holds the seat now; reset(seed=…) takes it back")
+                if seated and self._now is not None and readings.run != self._now.run:
+                    self._now = readings
+                    raise Error(
+                        f"somebody else has begun a new run ({readings.run}) in {self._where}; reset() goes on in it, "
+                        f"reset(seed=…) begins one of your own"
+                    )
                 if seated and not readings.driver:  # a simulation that is back: once seated we learn what it obeyed
                     self._seek("claim")
                 elif wanted(readings):
                     return readings
                 else:
                     otherwise(readings)
-        missing = [role for role in ("sim", "sensors") if role not in self._present]
-        why = f"{' and '.join(missing)} not there" if missing else "though all are there"
-        raise Error(f"no readings within {self._timeout:g} s from {self._where}: {why}")
+        raise Error(f"no readings within {self._timeout:g} s from {self._where}: {self._why()}")
+
+    def _why(self) -> str:
+        """Why no readings come, as far as the simulation can tell."""
+        if missing := [role for role in ("sim", "sensors") if role not in self._present]:
+            return f"{' and '.join(missing)} not there"
+        reply = self._bus.control(Control("status"))
+        if reply is None:
+            return "the simulation is there, but does not answer"
+        status = reply.status
+        if status.phase == "paused":
+            return f"it is paused; phototaxis control resume --name {self._bus.name} lets it go on"
+        if status.phase == "finished":
+            return "its run is finished; reset(seed=…) begins another"
+        if status.driver not in ("", self.ident):
+            return f"{status.driver} holds the seat and has not answered for {status.waited:.1f} s"
+        return f"it waits for {status.waiting_for}" if status.waiting_for else "though all are there"
 
     def _notice(self, event: Event | None) -> None:
         """Who is there."""
@@ -166,6 +204,11 @@ def _obeyed(command: Any, before: Any, now: Any) -> bool:
     return now.episode != before.episode if any(command.end) else (now.left, now.right) == (command.left, command.right)
 
 
+def _refuse_poses(starts: object) -> None:
+    if starts:
+        raise ValueError("options['pose']: a running system places its robots itself; leave it out with connect")
+
+
 class There:
     """One robot behind the bus."""
 
@@ -178,14 +221,16 @@ class There:
             self._link.close()
             raise Error(f"the world '{world}' has {self._link.world.robots} robots: gymnasium.make_vec drives them")
 
-    def begin(self, seed: int) -> Readings:
+    def begin(self, seed: int, start: Pose | None = None) -> Readings:
         """A new run with this seed."""
+        _refuse_poses(start)
         return self._link.begin(seed)
 
     def drive(self, left: float, right: float) -> Readings:
         return self._link.answer(lambda run, tick: Command(run, tick, self._link.ident, left, right))
 
-    def place(self, end: End) -> Readings:
+    def place(self, end: End, start: Pose | None = None) -> Readings:
+        _refuse_poses(start)
         return self._link.answer(lambda run, tick: Command(run, tick, self._link.ident, 0.0, 0.0, end))
 
     def close(self) -> None:
@@ -206,15 +251,27 @@ class ManyThere:
             why = "one robot is for gymnasium.make" if count == 1 else f"start it with --robots {count}"
             raise Error(f"the world '{world}' has {self._link.world.robots} robots, num_envs is {count}; {why}")
 
-    def begin(self, seeds: Sequence[int]) -> CrowdReadings:
+    @property
+    def tick(self) -> int:
+        return self._link.tick
+
+    def begin(self, seeds: Sequence[int], starts: Mapping[int, Pose]) -> CrowdReadings:
         """A new run; the seeds must follow one another."""
+        _refuse_poses(starts)
         if list(seeds) != list(range(seeds[0], seeds[0] + self._count)):
-            raise Error("behind the bus the robots' seeds are S, S + 1, S + 2, …: give reset one number")
+            raise Error(f"{FOLLOW}: give reset one number")
         return self._senses(self._link.begin(seeds[0]))
 
     def drive(self, motors: np.ndarray, ends: np.ndarray) -> CrowdReadings:
         columns = pack(motors[0]), pack(motors[1]), pack(ends, FLAG)
         return self._senses(self._link.answer(lambda run, tick: CommandOfMany(run, tick, self._link.ident, *columns)))
+
+    def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> CrowdReadings:
+        """One tick, in which the others hold still."""
+        _refuse_poses(starts)
+        if seeds:
+            raise Error(f"{FOLLOW}: give reset one number, and no reset_mask")
+        return self.drive(np.zeros((2, self._count)), ends)
 
     def close(self) -> None:
         """Leave the seat and the bus."""

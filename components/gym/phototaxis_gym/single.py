@@ -4,19 +4,19 @@ from typing import Any, Literal
 
 import gymnasium
 import numpy as np
-from gymnasium.error import Error, InvalidAction, ResetNeeded
+from gymnasium import logger
+from gymnasium.error import Error, ResetNeeded
 from phototaxis.errors import UserError
-from phototaxis.messages import Readings
+from phototaxis.messages import End, Readings
 from phototaxis.task import Memory, lit
 from phototaxis_sim import arenas
 
 from phototaxis_gym import CAP
-from phototaxis_gym.draw import Canvas, Window
+from phototaxis_gym.draw import Canvas, Window, frame_rate
 from phototaxis_gym.place import Here, Place
 from phototaxis_gym.remote import There
-from phototaxis_gym.spaces import MOTORS, actions, observation, rewards, valid_cap, valid_percept
-
-SEEDS = 2**31
+from phototaxis_gym.resets import LARGEST, given_poses, run_seed
+from phototaxis_gym.spaces import actions, motors, observation, rewards, valid_cap, valid_percept
 
 
 class LightSeeker(gymnasium.Env[Any, Any]):
@@ -29,19 +29,23 @@ class LightSeeker(gymnasium.Env[Any, Any]):
     arena : name of a shipped arena, or a TOML file; on the bus it is the simulation's.
     reward : "own" (the percept's), "difference", "static" or "potential".
     action : "discrete" (nine motor commands) or "continuous" (two wheels, −1..1).
-    cap : steps after which an episode is truncated.
+    cap : steps after which an episode is truncated, up to 300. None: only `max_episode_steps` of `gymnasium.make`
+        truncates, which is 300 unless it is given.
     render_mode : None, "rgb_array" or "human"; on the bus None: people watch in the Rerun viewer.
     connect : "" for a world in this process. "local" (this machine's sockets), a Zenoh endpoint as
         "tcp/HOST:7447" or a Zenoh configuration file: drive the robot of a running system.
     world : name of the world on the bus.
     timeout : seconds to wait for an answer from the bus.
 
-    Terminated: the light is reached. Truncated: the step cap. `reset(seed=…)` begins anew: the same seed and
-    actions give the same trajectory; without a seed the next episode of the same run begins. On the bus a seed
-    begins a new run there.
+    Terminated: the light is reached; then `info["is_success"]` is true. Truncated: the step cap. `reset(seed=…)`
+    begins anew: the same seed and actions give the same trajectory; without a seed the next episode of the same run
+    begins. `reset(options={"pose": (x, y, heading)})` places the robot there (m, rad). On the bus a seed begins a new
+    run, and nobody can choose the pose.
+
+    Copies and pickles go on exactly as the original does; an environment on the bus has none.
     """
 
-    metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 10}  # noqa: RUF012 - Gymnasium's own form
+    metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 2}  # noqa: RUF012 - Gymnasium's own form
 
     def __init__(
         self,
@@ -49,27 +53,26 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         arena: str = "",
         reward: str = "own",
         action: Literal["discrete", "continuous"] = "discrete",
-        cap: int = CAP,
+        cap: int | None = None,
         render_mode: str | None = None,
         connect: str = "",
         world: str = "phototaxis",
         timeout: float = 10.0,
     ):
-        if connect:
-            self.metadata = {**self.metadata, "render_modes": []}
+        modes = [] if connect else self.metadata["render_modes"]
         if connect and (arena or render_mode):
             what = f"arena '{arena}'" if arena else f"render_mode '{render_mode}'"
             raise Error(f"{what}: that is the running system's; leave it out with connect")
-        modes = self.metadata["render_modes"]
         if render_mode is not None and render_mode not in modes:
             raise Error(f"no render_mode '{render_mode}'; there are: {', '.join(modes)}")
         self._reward, self.action_space = rewards(reward, valid_percept(percept)), actions(action)
-        self._cap, self.render_mode = valid_cap(cap), render_mode
+        self._cap, self.render_mode = None if cap is None else valid_cap(cap), render_mode
         try:
             self._place: Place = There(connect, world, timeout) if connect else Here(arenas.enter(arena or "paper"))
         except UserError as error:
             raise Error(str(error)) from None
         self._arena = self._place.arena
+        self.metadata = {**self.metadata, "render_modes": modes, "render_fps": frame_rate(self._arena)}
         self._observe = observation(percept, self._arena)
         self.observation_space = self._observe.space
         self._memory, self._steps = Memory(), 0
@@ -78,13 +81,17 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         self._window = Window(self.metadata["render_fps"]) if render_mode == "human" else None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode at a random placement."""
+        """Begin an episode at a random placement, or at the pose in `options`."""
+        start = given_poses(options, self._arena).get(0)
         super().reset(seed=seed)
-        if seed is not None or self._readings is None:
-            self._readings = self._place.begin(int(self.np_random.integers(SEEDS)) if seed is None else seed)
+        if seed is None and self._np_random_seed == -1:  # the user has set the generator
+            seed = int(self.np_random.integers(LARGEST))
+        elif seed is None and self._readings is None:
+            seed = self.np_random_seed
+        if seed is None:
+            self._readings = self._place.place(self._end, start)
         else:
-            end = "reached" if lit(self._readings) else "cap" if self._steps >= self._cap else "asked"
-            self._readings = self._place.place(end)
+            self._readings = self._place.begin(run_seed(seed), start)
         self._memory.clear()
         self._steps = 0
         return self._look(self._readings), self._info(self._readings)
@@ -93,17 +100,19 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         """Hold an action for one control period (half a second in the paper's arena)."""
         if self._readings is None:
             raise ResetNeeded("reset() comes before step()")
-        if not self.action_space.contains(action):
-            raise InvalidAction(f"{action!r} is not in {self.action_space}")
-        left, right = MOTORS[action] if isinstance(self.action_space, gymnasium.spaces.Discrete) else action
-        now = self._readings = self._place.drive(float(left), float(right))
+        wheels = motors(self.action_space, action)
+        if self._steps and lit(self._readings):
+            logger.warn("step() after the episode has terminated: reset() begins the next one")
+        now = self._readings = self._place.drive(*wheels)
         self._steps += 1
         seen = self._look(now)
         reward = self._reward(max(self._memory.before), now, self._memory.unchanged)
-        return seen, float(reward), bool(lit(now)), self._steps >= self._cap, self._info(now)
+        return seen, float(reward), bool(lit(now)), self._steps >= (self._cap or np.inf), self._info(now)
 
     def render(self) -> np.ndarray | None:
         """A picture, (height, width, 3) uint8; None where it goes to a window."""
+        if self.render_mode is None:
+            logger.warn("render() without a render_mode shows nothing; give gymnasium.make one, as 'rgb_array'")
         pose = self._place.pose
         if self._canvas is None or self._readings is None or pose is None:
             return None
@@ -118,6 +127,13 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         if self._window is not None:
             self._window.close()
 
+    @property
+    def _end(self) -> End:
+        """How the present episode ends when the next one is asked for."""
+        if self._readings is not None and lit(self._readings):
+            return "reached"
+        return "cap" if self._steps >= (self._cap or CAP) else "asked"
+
     def _look(self, readings: Readings) -> Any:
         self._memory.see(readings)
         if self._window is not None:
@@ -128,4 +144,5 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         """For people, not for learners: where the robot is (not on the bus, where a driver is not told)."""
         pose = self._place.pose
         place = {} if pose is None else {"pose": np.array(pose)}
-        return {**place, "tick": readings.tick, "episode_number": readings.episode}
+        success = bool(lit(readings))
+        return {**place, "tick": readings.tick, "episode_number": readings.episode, "is_success": success}

@@ -6,9 +6,15 @@ from typing import Any, Protocol
 import numpy as np
 from gymnasium import spaces
 from gymnasium.error import Error
+from gymnasium.vector.utils import iterate
 from phototaxis.arena import Arena
 from phototaxis.task import ACTIONS, OWN_REWARD, PERCEPTS, REWARDS, Percept, Reward
 
+from phototaxis_gym import CAP
+from phototaxis_gym.errors import WrongAction, WrongCount
+
+ROUNDING = 1e-6
+"""How far a wheel command may lie outside of −1..1: what arithmetic in float32 makes of ±1. It is clipped."""
 MOTORS = np.array(ACTIONS)
 """(9, 2): the motor commands of the discrete actions."""
 
@@ -118,14 +124,66 @@ def actions(kind: str) -> spaces.Space[Any]:
     raise Error(f"no actions '{kind}'; there are: discrete, continuous")
 
 
+def motors(space: spaces.Space[Any], action: Any) -> tuple[float, float]:
+    """The wheels' commands of one action, whatever number type it has.
+
+    Raises
+    ------
+    WrongAction
+        when it is not in the space.
+    """
+    if isinstance(space, spaces.Discrete):
+        if space.contains(action):
+            return ACTIONS[int(action)]
+    elif (wheels := _numbers(action)).shape == (2,) and (np.abs(wheels) <= 1 + ROUNDING).all():
+        left, right = np.clip(wheels, -1.0, 1.0).tolist()
+        return left, right
+    raise WrongAction(f"{action!r} is not in {space}")
+
+
+def motors_of_many(space: spaces.Space[Any], single: spaces.Space[Any], actions: Any, count: int) -> np.ndarray:
+    """(count, 2): the wheels' commands of a batch of actions in `space`, each of them in `single`.
+
+    Raises
+    ------
+    WrongAction
+        when one is not in the space.
+    WrongCount
+        when they are not so many.
+    TypeError
+        as SyncVectorEnv does, for what is no batch.
+    """
+    given: np.ndarray = actions if isinstance(actions, np.ndarray) else np.empty(0)
+    if isinstance(single, spaces.Discrete):
+        if given.shape == (count,) and given.dtype.kind in "iu" and ((given >= 0) & (given < len(MOTORS))).all():
+            return MOTORS[given]
+    elif given.shape == (count, 2) and given.dtype.kind in "fiu" and (np.abs(given) <= 1).all():
+        return given.astype(float)
+    rows = list(iterate(space, actions))
+    if len(rows) != count:
+        raise WrongCount(f"{len(rows)} actions for {count} robots")
+    return np.array([motors(single, row) for row in rows])
+
+
+def _numbers(action: Any) -> np.ndarray:
+    """An action as an array of floats; empty when it is nothing of the kind."""
+    try:
+        given = np.asarray(action)
+    except ValueError:  # lists of different lengths
+        return np.empty(0)
+    return given.astype(float) if given.dtype.kind in "biuf" else np.empty(0)
+
+
 def valid_cap(cap: int) -> int:
     """The steps of an episode, at least one.
 
     Raises
     ------
     gymnasium.error.Error
-        for fewer.
+        for fewer, or for more than Gymnasium's own limit allows.
     """
     if cap < 1:
         raise Error(f"cap {cap}: an episode has at least one step")
+    if cap > CAP:
+        raise Error(f"cap {cap}: Gymnasium cuts episodes after {CAP} steps; give max_episode_steps={cap} instead")
     return cap

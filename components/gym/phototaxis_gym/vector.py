@@ -1,38 +1,54 @@
 """Many robots as one vector environment, stepped together: in shared pymunk spaces and NumPy, or behind the bus."""
 
-from collections import deque
 from collections.abc import Sequence
-from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
-from gymnasium.error import Error, InvalidAction, ResetNeeded
+from gymnasium import logger
+from gymnasium.error import Error, ResetNeeded
+from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from phototaxis.errors import UserError
 from phototaxis.messages import ENDS
-from phototaxis.task import EQUAL, STEPS, CrowdReadings, lit
+from phototaxis.task import CrowdReadings, lit
 from phototaxis_sim import arenas
 
 from phototaxis_gym import CAP
+from phototaxis_gym.draw import SIDE, Canvas, Window, frame_rate, tiles
+from phototaxis_gym.errors import EpisodeOver
+from phototaxis_gym.memories import Memories
 from phototaxis_gym.place import ManyHere, Places
 from phototaxis_gym.remote import ManyThere
-from phototaxis_gym.spaces import MOTORS, actions, observation, rewards, valid_cap, valid_percept
+from phototaxis_gym.resets import given_poses, reset_mask, row_seeds, run_seed
+from phototaxis_gym.spaces import actions, motors_of_many, observation, rewards, valid_cap, valid_percept
 
-SEEDS = 2**31
-REACHED, CAPPED = ENDS.index("reached"), ENDS.index("cap")
+REACHED, CAPPED, ASKED = (ENDS.index(end) for end in ("reached", "cap", "asked"))
 
 
 class LightSeekers(VectorEnv[Any, Any, Any]):
     """The vector form of `LightSeeker`: the same options, spaces, rewards and ends for `num_envs` robots.
 
-    Robot i begins with the placements of the seed `seed + i`, episode after episode (or of the i-th of several
-    seeds). A robot whose episode has ended is placed anew by the next step, which ignores its action
-    (`AutoresetMode.NEXT_STEP`). Sensor noise is that of the first seed. With `connect` the robots are those of a
-    running system that was started with `--robots`.
+    It does what Gymnasium's SyncVectorEnv does with as many `LightSeeker`s. Robot i begins with the placements of the
+    seed `seed + i`, episode after episode (or of the i-th of several seeds). Sensor noise is that of the first seed.
+    With `connect` the robots are those of a running system that was started with `--robots`.
+
+    Parameters
+    ----------
+    max_episode_steps : steps after which an episode is truncated; −1 for no limit. `cap` can lower it.
+    render_mode : None, "rgb_array" (`render` returns one picture for each robot) or "human" (all in one window).
+    autoreset_mode : what becomes of a robot whose episode has ended. NEXT_STEP: the next step places it anew and
+        ignores its action. SAME_STEP: it is placed anew at once; `info` has "final_obs" and "final_info". DISABLED:
+        `reset(options={"reset_mask": …})` places it anew. On the bus the last two take one more tick of the running
+        system, in which the other robots hold still.
+    disable_env_checker : has no effect, as there is no checker for many.
     """
 
-    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - Gymnasium's form
+    metadata = {  # noqa: RUF012 - Gymnasium's form
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": 2,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
 
     def __init__(
         self,
@@ -41,121 +57,159 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         arena: str = "",
         reward: str = "own",
         action: Literal["discrete", "continuous"] = "discrete",
-        cap: int = CAP,
+        cap: int | None = None,
         render_mode: str | None = None,
         connect: str = "",
         world: str = "phototaxis",
         timeout: float = 10.0,
+        max_episode_steps: int = CAP,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        disable_env_checker: bool | None = None,
     ):
-        if render_mode is not None:
-            raise Error(f"render_mode {render_mode}: many robots are not drawn; leave it out")
-        if connect and arena:
-            raise Error(f"arena '{arena}': that is the running system's; leave it out with connect")
+        modes = [] if connect else self.metadata["render_modes"]
+        if connect and (arena or render_mode):
+            what = f"arena '{arena}'" if arena else f"render_mode '{render_mode}'"
+            raise Error(f"{what}: that is the running system's; leave it out with connect")
+        if render_mode is not None and render_mode not in modes:
+            raise Error(f"no render_mode '{render_mode}' for many robots; there are: {', '.join(modes)}")
         if num_envs < 1:
             raise Error(f"num_envs {num_envs}: at least one robot is needed")
-        self.num_envs, self._cap = num_envs, valid_cap(cap)
+        if max_episode_steps < 1 and max_episode_steps != -1:
+            raise Error(f"max_episode_steps {max_episode_steps}: at least one step, or -1 for no limit")
+        limit = np.inf if max_episode_steps == -1 else max_episode_steps
+        self.num_envs, self._cap = num_envs, limit if cap is None else min(valid_cap(cap), limit)
         self._reward, self.single_action_space = rewards(reward, valid_percept(percept)), actions(action)
+        self._mode, self.render_mode = AutoresetMode(autoreset_mode), render_mode
         try:
             self._place: Places = (
                 ManyThere(connect, world, timeout, num_envs) if connect else ManyHere(arenas.enter(arena or "paper"))
             )
         except UserError as error:
             raise Error(str(error)) from None
-        arena_ = self._place.arena
-        self._observe = observation(percept, arena_)
+        self._arena = self._place.arena
+        fps = frame_rate(self._arena)
+        self.metadata = {"render_modes": modes, "render_fps": fps, "autoreset_mode": self._mode}
+        self._observe = observation(percept, self._arena)
         self.single_observation_space = self._observe.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._discrete = action == "discrete"
-        self._readings: CrowdReadings | None = None
+        self._window = Window(fps) if render_mode == "human" else None
+        side = SIDE if self._window is None else max(2 * SIDE // int(np.ceil(np.sqrt(num_envs))), 1)
+        self._canvas = Canvas(self._arena, min(side, SIDE)) if render_mode else None
+        self._seeds: list[int] | None = None
+        self._readings: Any = None
+        self._episodes, self._steps = np.zeros(num_envs, int), np.zeros(num_envs, int)
+        self._ends, self._memory = np.zeros(num_envs, np.uint8), Memories(num_envs)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override] - as SyncVectorEnv has it
+        """The seed of each robot's run; drawn now if there is none yet."""
+        if self._seeds is None:
+            first = seeding.np_random()[1]
+            self._seeds = [first + row for row in range(self.num_envs)]
+        return tuple(self._seeds)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode of every robot; without a seed with placements that follow from the last seed."""
+        """Begin an episode of every robot, or of those in `options["reset_mask"]`; of its run where it has no seed.
+
+        `options["pose"]` is a pose for all robots, (3,), or one for each, (N, 3): x and y in m, heading in rad.
+        """
         count = self.num_envs
-        super().reset(seed=seed if isinstance(seed, int) else None)
-        first = int(self.np_random.integers(SEEDS)) if seed is None else seed
-        given = [first + row for row in range(count)] if isinstance(first, int) else first
-        seeds = [int(self.np_random.integers(SEEDS)) if one is None else one for one in given]
-        if len(seeds) != count or min(seeds) < 0:
-            raise Error(f"seed={seed}: one number, or one for each of the {count} robots; none below 0")
-        self._episodes, self._steps = np.zeros(count, int), np.zeros(count, int)
-        self._ends = np.zeros(count, np.uint8)
-        self._memory = Memories(count)
-        return self._look(self._place.begin(seeds)), self._info()
+        mask, starts = reset_mask(options, count), given_poses(options, self._arena, count)
+        rows, seeds = np.flatnonzero(mask).tolist(), row_seeds(seed, count)
+        if self._readings is None and not mask.all():
+            raise ResetNeeded("the first reset() is of all robots; leave reset_mask out")
+        known = self.np_random_seed
+        used = [known[row] if one is None or not mask[row] else one for row, one in enumerate(seeds)]
+        if mask.all() and (self._readings is None or None not in seeds):
+            senses = self._place.begin([run_seed(one) for one in used], starts)
+            super().reset(seed=used[0])
+            self._episodes, self._memory = np.zeros(count, int), Memories(count)
+            self._take(senses)
+        else:
+            new = {row: run_seed(used[row]) for row in rows if seeds[row] is not None}
+            self._renew(mask, new, {row: start for row, start in starts.items() if mask[row]})
+        self._seeds, self._steps[mask], self._ends[mask] = used, 0, 0
+        return self._look(), self._info(mask)
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold an action for one control period."""
         if self._readings is None:
             raise ResetNeeded("reset() comes before step()")
-        motors, fresh = self._motors(np.asarray(actions)), self._ends > 0
+        motors = motors_of_many(self.action_space, self.single_action_space, actions, self.num_envs)
+        fresh = self._ends > 0
+        if self._mode == AutoresetMode.DISABLED and fresh.any():
+            over = np.flatnonzero(fresh).tolist()
+            raise EpisodeOver(f"the episodes of the robots {over} have ended: reset(options={{'reset_mask': …}}) first")
         self._episodes += fresh
         self._steps = np.where(fresh, 0, self._steps + 1)
-        self._memory.forget(np.flatnonzero(fresh))
-        senses = self._place.drive(motors.T, self._ends)
-        seen, memory = self._look(senses), self._memory
+        self._memory.forget(fresh)
+        senses = self._take(self._place.drive(motors.T, self._ends))
+        seen, memory = self._look(), self._memory
         reward = self._reward.many(np.maximum(*memory.before), senses, memory.unchanged)
         terminated, truncated = np.asarray(lit(senses)), self._steps >= self._cap
         for column in (reward, terminated, truncated):
             column[fresh] = 0
         self._ends = np.where(terminated, REACHED, np.where(truncated, CAPPED, 0)).astype(np.uint8)
-        return seen, reward, terminated, truncated, self._info()
+        info: dict[str, Any] = {}
+        if self._mode == AutoresetMode.SAME_STEP and (over := self._ends > 0).any():
+            rows = self._info(over)
+            for row in np.flatnonzero(over).tolist():
+                final = {key: rows[key][row] for key in rows if not key.startswith("_")}
+                info = self._add_info(info, {"final_obs": seen[row], "final_info": final}, row)
+            self._renew(over, {}, {})
+            self._steps[over], self._ends[over] = 0, 0
+            seen = self._look()
+        return seen, reward, terminated, truncated, {**info, **self._info(np.ones(self.num_envs, bool))}
+
+    def render(self) -> tuple[Any, ...]:
+        """A picture of each robot, (height, width, 3) uint8; None where they go to a window."""
+        if self._readings is None:
+            raise ResetNeeded("reset() comes before render()")
+        if self._canvas is None:
+            logger.warn("render() without a render_mode shows nothing; give gymnasium.make_vec one, as 'rgb_array'")
+            return (None,) * self.num_envs
+        poses, sonar = np.asarray(self._place.poses).tolist(), self._readings.sonar.T.tolist()
+        pictures = tuple(self._canvas.draw(pose, rays) for pose, rays in zip(poses, sonar, strict=True))
+        if self._window is None:
+            return pictures
+        self._window.show(tiles(pictures))
+        return (None,) * self.num_envs
 
     def close_extras(self, **kwargs: Any) -> None:
         """Leave the world; `close` calls it."""
         self._place.close()
+        if self._window is not None:
+            self._window.close()
 
-    def _motors(self, given: np.ndarray) -> np.ndarray:
-        """The wheels' commands (N, 2) of a batch of actions."""
-        if self._discrete:
-            good = given.shape == (self.num_envs,) and given.dtype.kind in "iu"
-            if not good or (given < 0).any() or (given >= len(MOTORS)).any():
-                raise InvalidAction(f"{given!r} is not in {self.action_space}")
-            return MOTORS[given]
-        if given.shape != (self.num_envs, 2) or not (np.abs(given) <= 1).all():
-            raise InvalidAction(f"{given!r} is not in {self.action_space}")
-        return given.astype(float)
+    def _renew(self, mask: np.ndarray, seeds: dict[int, int], starts: dict[int, Any]) -> None:
+        """Begin new episodes of some robots; the others see what they have seen."""
+        ends = np.where(mask, np.where(self._ends > 0, self._ends, ASKED), 0).astype(np.uint8)
+        pairs = zip(self._place.renew(ends, seeds, starts), self._readings, strict=True)
+        self._readings = CrowdReadings(*(np.where(mask, new, old) for new, old in pairs))
+        self._episodes[mask] += 1
+        self._episodes[list(seeds)] = 0
+        self._memory.begin(self._readings, mask)
 
-    def _look(self, senses: CrowdReadings) -> Any:
+    def _take(self, senses: CrowdReadings) -> CrowdReadings:
+        """Remember the readings of a step."""
         self._readings = senses
         self._memory.see(senses)
-        seen = self._observe(senses, self._memory)
-        return np.asarray(seen, self.single_observation_space.dtype)
+        return senses
 
-    def _info(self) -> dict[str, Any]:
-        poses = self._place.poses
-        return {**({} if poses is None else {"pose": poses}), "episode_number": self._episodes.copy()}
+    def _look(self) -> Any:
+        """The observations."""
+        if self._window is not None:
+            self.render()
+        return np.asarray(self._observe(self._readings, self._memory), self.single_observation_space.dtype)
 
-
-class Memories:
-    """`Memory` of N robots whose episodes begin at different times."""
-
-    def __init__(self, count: int):
-        self._lights: deque[np.ndarray] = deque(maxlen=STEPS)
-        self._age = np.zeros(count, int)
-
-    def forget(self, rows: np.ndarray) -> None:
-        """Begin new episodes."""
-        self._age[rows] = 0
-
-    def see(self, senses: CrowdReadings) -> None:
-        """Remember the readings of one step."""
-        self._lights.append(senses.light)
-        self._age += 1
-
-    @property
-    def before(self) -> np.ndarray:
-        """(2, N): the readings of the step before; at the first step those of that step."""
-        now = self._lights[-1]
-        return np.where(self._age > 1, self._lights[-2], now) if len(self._lights) > 1 else now
-
-    @property
-    def unchanged(self) -> np.ndarray:
-        """(N,): whether the light has not changed in 5 consecutive steps of the episode."""
-        same = self._age >= STEPS
-        if not same.any():
-            return same
-        for one, other in combinations(self._lights, 2):
-            same = same & (np.abs(one - other) <= EQUAL).all(axis=0)
-        return same
+    def _info(self, mask: np.ndarray) -> dict[str, Any]:
+        """The `info` of those robots in the form of SyncVectorEnv: an array for each key, and who has it."""
+        poses, count = self._place.poses, self.num_envs
+        columns = {} if poses is None else {"pose": poses.copy()}
+        columns["tick"] = np.full(count, self._place.tick)
+        columns["episode_number"] = self._episodes.copy()
+        columns["is_success"] = np.asarray(lit(self._readings))
+        return {**columns, **{f"_{key}": mask.copy() for key in columns}}

@@ -1,8 +1,8 @@
-"""`phototaxis evaluate`: measure the policy in a checkpoint."""
+"""`phototaxis evaluate`: measure the policy in a checkpoint, or in a file of Stable-Baselines3."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta, Struct
@@ -19,15 +19,19 @@ class Options(Struct, kw_only=True):
     """Options of `phototaxis evaluate`."""
 
     checkpoint: str
-    """checkpoint (.npz) whose policy is measured"""
+    """checkpoint (.npz) whose policy is measured, or a policy (.zip) that Stable-Baselines3 has saved"""
     placements: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
     """fresh random placements"""
     seed: Seed = 1
     """decides the placements and the policy's draws; never those of a training"""
     arena: str = ""
-    """another arena than the one of the training"""
+    """another arena than the one of the training (which a .zip does not name: then paper)"""
     cap: Annotated[int, Meta(ge=1)] = 300
     """steps after which a placement counts as failed"""
+    trust: bool = False
+    """load a .zip although such a file can run any code: you trust who made it"""
+    normalize: str = ""
+    """statistics of a .zip's observations: the file (.pkl) that VecNormalize.save has written"""
     json: bool = False
     """print the result as one JSON object"""
 
@@ -36,13 +40,23 @@ def main(argv: Sequence[str]) -> int:
     about = "Freeze the policy of a checkpoint and measure it on fresh random placements."
     groups = {"": Options, "sensor models": FmuOptions}
     options, fmus = parse_groups(groups, argv, "phototaxis evaluate", about, positional=["checkpoint"])
+    from phototaxis_agent.policies import is_policy, load_policy
     from phototaxis_agent.setup import from_checkpoint
     from phototaxis_agent.stuck import watched
     from phototaxis_sensors.choice import choose
+    from phototaxis_sim import arenas
 
-    from phototaxis_lab.measure import SEED_OFFSET, describe, evaluate
+    from phototaxis_lab.measure import SEED_OFFSET, evaluate, measure
 
     path = Path(options.checkpoint)
+    if is_policy(path):
+        arena = arenas.enter(options.arena or "paper")
+        policy = load_policy(path, options.trust, options.normalize)
+        with choose(fmus) as sensors:
+            found = measure(arena, policy.crowd(arena), options.placements, options.seed, options.cap, sensors)
+        return tell(found, {"arena": options.arena or arena.name, "arena_digest": arena.digest}, options.json)
+    if options.normalize:
+        raise UserError(f"{path}: --normalize belongs to a policy that Stable-Baselines3 has saved (.zip)")
     meta, arrays = load(path)
     arena = where(path, meta, options.arena)
     setup = from_checkpoint(meta, str(path))
@@ -56,8 +70,15 @@ def main(argv: Sequence[str]) -> int:
         "learned_in": meta.arena,
         "learned_in_digest": meta.arena_digest,
     }
+    return tell(found, place, options.json)
+
+
+def tell(found: Any, place: dict[str, str], as_json: bool) -> int:
+    """Print what was found, and in which arena."""
+    from phototaxis_lab.measure import describe
+
     told = msgspec.json.encode(msgspec.to_builtins(found) | place).decode()
-    print(told if options.json else f"{describe(found)}; measured in the arena '{place['arena']}'")
+    print(told if as_json else f"{describe(found)}; measured in the arena '{place['arena']}'")
     return 0
 
 

@@ -1,7 +1,7 @@
 """A run of many robots: the ticks, episodes and epochs of `Simulation` for N robots, each alone in its arena."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from phototaxis.arena import Arena
@@ -19,7 +19,8 @@ TOGETHER = 256
 class SimulationOfMany:
     """N robots from tick to tick.
 
-    Robot i is placed as in a run with the seed `seeds[i]`: seed + i unless other seeds are given.
+    Robot i is placed as in a run with the seed `seeds[i]`: seed + i unless other seeds are given. `starts` has the
+    poses of those robots whose first episode starts elsewhere.
 
     Attributes
     ----------
@@ -32,20 +33,28 @@ class SimulationOfMany:
     """
 
     def __init__(
-        self, arena: Arena, seed: int, run: str, epochs: int = 0, robots: int = 1, seeds: Sequence[int] | None = None
+        self,
+        arena: Arena,
+        seed: int,
+        run: str,
+        epochs: int = 0,
+        robots: int = 1,
+        seeds: Sequence[int] | None = None,
+        starts: Mapping[int, Pose] | None = None,
     ):
         self.world = World(run, arena, seed, epochs, robots)
         self._seeds = [seed + row for row in range(robots)] if seeds is None else list(seeds)
+        self._given = dict(starts or {})
         self._physics = Physics(arena)
         self.episode, self.tick, self.epoch = np.zeros(robots, int), 0, 0
         self.episodes = self.reached = 0
         self.outcomes: list[bool] = []
         self.ended: Episode | None = None
         self._began = 0
-        starts = [self._placement(row) for row in range(robots)]
-        self._start = starts[0]
+        first = [self._placement(row) for row in range(robots)]
+        self._start = first[0]
         self._groups = [slice(start, start + TOGETHER) for start in range(0, robots, TOGETHER)]
-        self._crowds = [Crowd(arena, starts[group]) for group in self._groups]
+        self._crowds = [Crowd(arena, first[group]) for group in self._groups]
         self._chain = b"\0" * 8
         self._motors = np.zeros((2, robots))
         self._look()
@@ -106,10 +115,21 @@ class SimulationOfMany:
         self.outcomes = (ends[over] == ENDS.index("reached")).tolist()
         self.episodes += len(over)
         self.reached += sum(self.outcomes)
-        self.episode[over] += 1
-        for row in over.tolist():
+        self.renew(over)
+
+    def renew(self, rows: np.ndarray) -> None:
+        """Begin the next episode of some robots between two ticks; the others are not touched."""
+        self.episode[rows] += 1
+        for row in rows.tolist():
             self._crowds[row // TOGETHER].place(row % TOGETHER, self._placement(row))
         self._look()
+
+    def expect(self, row: int, seed: int | None = None, start: Pose | None = None) -> None:
+        """Prepare a robot's next episode: the first one of another seed, or at a pose."""
+        if seed is not None:
+            self._seeds[row], self.episode[row] = seed, -1
+        if start is not None:
+            self._given[row] = start
 
     @property
     def watched(self) -> State:
@@ -126,7 +146,9 @@ class SimulationOfMany:
         return unpack(given, robots) if isinstance(given, bytes) else np.full(robots, float(given))
 
     def _placement(self, row: int) -> Pose:
-        """As `Simulation` has it: a function of (seed, episode)."""
+        """As `Simulation` has it: the pose that was given, else a function of (seed, episode)."""
+        if row in self._given:
+            return self._given.pop(row)
         return self._physics.random_pose(np.random.default_rng((self._seeds[row], int(self.episode[row]))))
 
     def _look(self) -> None:

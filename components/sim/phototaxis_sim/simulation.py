@@ -45,6 +45,7 @@ class Simulation:
     seed : decides where each episode starts, as a pure function of (seed, episode).
     run : name of the run; has no influence on the trajectory.
     epochs : motor commands after which the run is finished; 0 for no end.
+    start : pose at which the first episode starts in place of the seed's.
 
     Attributes
     ----------
@@ -55,7 +56,7 @@ class Simulation:
     digest : of the arena.
     """
 
-    def __init__(self, arena: Arena, seed: int, run: str, epochs: int = 0):
+    def __init__(self, arena: Arena, seed: int, run: str, epochs: int = 0, start: Pose | None = None):
         self.world, self.digest = World(run, arena, seed, epochs), arena.digest
         self.ended: Episode | None = None
         self.episodes = self.reached = 0
@@ -64,7 +65,7 @@ class Simulation:
         self._tick = self._episode = self._epoch = self._steps = self._idle = 0
         self._chain = b"\0" * 8
         self._start = Pose(0, 0, 0)
-        self.state = self._begin()
+        self.state = self._begin(start)
 
     @property
     def finished(self) -> bool:
@@ -88,8 +89,10 @@ class Simulation:
         """Another run in the same arena."""
         return Simulation(self.world.arena, seed, run, self.world.epochs)
 
-    def advance(self, left: float, right: float, author: str, end: End = "") -> State:
+    def advance(self, left: float, right: float, author: str, end: End = "", start: Pose | None = None) -> State:
         """Hold a command for one control period, or end the episode; the next state.
+
+        The next episode starts at `start` if it is given, else where the seed says.
 
         Raises
         ------
@@ -110,7 +113,7 @@ class Simulation:
                 )
             self._episode += 1
             self._steps = 0
-            self.state = self._begin()
+            self.state = self._begin(start)
         else:
             self._epoch += 1
             self._steps += 1
@@ -133,16 +136,19 @@ class Simulation:
             self.digest,
         )
 
-    def restore(self, at: Snapshot) -> None:
-        """Go to the first tick of an episode; the same commands then lead to the same states."""
+    def restore(self, at: Snapshot, start: Pose | None = None) -> None:
+        """Go to the first tick of an episode; the same commands then lead to the same states.
+
+        `start` is the pose that was given for the episode, if one was.
+        """
         self._tick, self._episode, self._epoch, self._steps = at.tick, at.episode, at.epoch, 0
         self.episodes, self.reached, self._chain = at.episodes, at.reached, at.chain
-        self.state = self._begin()
+        self.state = self._begin(start)
 
-    def _begin(self) -> State:
+    def _begin(self, start: Pose | None) -> State:
         self._before = self._chain
         rng = np.random.default_rng((self.world.seed, self._episode))
-        self._start = self._physics.random_pose(rng)
+        self._start = self._physics.random_pose(rng) if start is None else start
         return self._report(self._physics.place(self._start), 0.0, 0.0, "")
 
     def _report(self, motion: Motion, left: float, right: float, author: str) -> State:

@@ -1,0 +1,38 @@
+"""Files with frozen policies of others, which drive in the place of a learner: found by their suffix."""
+
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from phototaxis.errors import UserError
+
+POLICIES = "phototaxis.policies"
+
+
+def is_policy(file: Path) -> bool:
+    """Whether there is an entry point that is called as the file's suffix."""
+    return bool(entry_points(group=POLICIES, name=file.suffix.removeprefix(".")))
+
+
+def load_policy(file: Path, trusted: bool, normalize: str = "") -> Any:
+    """What makes agents of a policy file: called with a world and a step cap it makes one, `crowd(arena)` many.
+
+    `normalize` names the file with the statistics of the observations, if there is one.
+
+    Raises
+    ------
+    UserError
+        when nothing reads such files, what it needs is not installed, or a file cannot be loaded.
+    """
+    points = {point.name: point for point in entry_points(group=POLICIES)}
+    point = points.get(file.suffix.removeprefix("."))
+    if point is None:
+        raise UserError(f"--policy {file}: no policies of the kind '{file.suffix}'; there are: .{', .'.join(points)}")
+    try:
+        kind = point.load()
+    except ModuleNotFoundError as error:
+        line = (
+            f"--policy needs the package {error.name}; install it with: pip install 'phototaxis[gym]' stable-baselines3"
+        )
+        raise UserError(line) from None
+    return kind(file, trusted, Path(normalize)) if normalize else kind(file, trusted)

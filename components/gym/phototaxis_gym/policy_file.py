@@ -1,0 +1,148 @@
+"""Files of Stable-Baselines3 and sb3-contrib: which algorithm saved one, the model in it, and its statistics."""
+
+import json
+import zipfile
+import zlib
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from phototaxis.errors import UserError
+
+Normalize = Callable[[np.ndarray], np.ndarray]
+"""What VecNormalize makes of observations."""
+
+SB3, CONTRIB = "stable_baselines3", "sb3_contrib"
+
+
+class Algorithm(NamedTuple):
+    """An algorithm and how its files are known: by a field that they have, or by a module of their policy's class."""
+
+    name: str
+    package: str
+    field: str = ""
+    module: str = ""
+
+
+ALGORITHMS = (  # the first that fits
+    Algorithm("RecurrentPPO", CONTRIB, module="sb3_contrib.common.recurrent"),
+    Algorithm("MaskablePPO", CONTRIB, module="sb3_contrib.common.maskable"),
+    Algorithm("QRDQN", CONTRIB, field="n_quantiles"),
+    Algorithm("TQC", CONTRIB, field="top_quantiles_to_drop_per_net"),
+    Algorithm("TRPO", CONTRIB, field="cg_max_steps"),
+    Algorithm("ARS", CONTRIB, field="n_delta"),
+    Algorithm("TD3", SB3, field="target_policy_noise"),
+    Algorithm("CrossQ", CONTRIB, field="policy_delay"),
+    Algorithm("SAC", SB3, field="target_entropy"),
+    Algorithm("DQN", SB3, field="exploration_fraction"),
+    Algorithm("PPO", SB3, field="clip_range"),
+    Algorithm("A2C", SB3, field="gae_lambda"),
+)
+UNSUPPORTED = {"MaskablePPO": "which actions it may choose is decided by a mask that the file does not hold"}
+
+
+def load(file: Path, trusted: bool) -> Any:
+    """The model in a file.
+
+    Raises
+    ------
+    UserError
+        when the file is not trusted, not such a file, of an algorithm that is not supported, or what it needs is not
+        installed.
+    """
+    try:
+        with zipfile.ZipFile(file) as archive:
+            fields = json.loads(archive.read("data"))
+            bases = [str(fields["policy_class"]["__module__"])]
+    except FileNotFoundError:
+        raise UserError(f"{file}: there is no such file") from None
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, OSError, KeyError, TypeError, ValueError):
+        raise UserError(f"{file}: not a policy that Stable-Baselines3 has saved") from None
+    require_trust(file, trusted)
+    for package in [SB3, CONTRIB] if bases[0].startswith(CONTRIB) else [SB3]:
+        require(file, package)
+    if not bases[0].startswith((SB3, CONTRIB)):  # a class of the user's: what it derives from says what it is
+        bases = [kind.__module__ for kind in guarded(file, lambda: stored_class(file)).__mro__]
+    algorithm = recognise(file, set(fields), bases)
+    require(file, algorithm.package)
+    if algorithm.name in UNSUPPORTED:
+        raise UserError(f"{file}: policies of {algorithm.name} are not supported: {UNSUPPORTED[algorithm.name]}")
+    kind = getattr(import_module(algorithm.package), algorithm.name)
+    return guarded(file, lambda: kind.load(file, device="cpu"))
+
+
+def normalizer(file: Path, trusted: bool, model: Any) -> Normalize:
+    """The statistics that `VecNormalize.save` has written.
+
+    Raises
+    ------
+    UserError
+        when the file is not trusted, not such a file, or of other observations than the model's.
+    """
+    if not file.is_file():
+        raise UserError(f"--normalize {file}: there is no such file")
+    require_trust(file, trusted)
+    from stable_baselines3.common.save_util import load_from_pkl
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    found = guarded(file, lambda: load_from_pkl(file))
+    if not isinstance(found, VecNormalize):
+        raise UserError(f"--normalize {file}: not what VecNormalize.save writes, but a {type(found).__name__}")
+    if not found.norm_obs:
+        return lambda seen: seen
+    shape = getattr(found.obs_rms, "mean", np.empty(0)).shape
+    if shape != model.observation_space.shape:
+        raise UserError(
+            f"--normalize {file}: statistics of observations of the shape {shape}; the policy observes "
+            f"{model.observation_space}"
+        )
+    return lambda seen: np.asarray(found.normalize_obs(seen), np.float32)
+
+
+def was_normalized(model: Any) -> bool:
+    """Whether the last observation of the training was not the environment's own but VecNormalize's."""
+    seen, original = model._last_obs, model._last_original_obs
+    return original is not None and not np.array_equal(seen, original)
+
+
+def require_trust(file: Path, trusted: bool) -> None:
+    if not trusted:
+        raise UserError(
+            f"{file}: a file of Stable-Baselines3 can run any code when it is loaded; "
+            f"if you trust who made it, add --trust"
+        )
+
+
+def require(file: Path, package: str) -> None:
+    if find_spec(package) is None:
+        raise UserError(f"{file} needs the package {package}: pip install {package.replace('_', '-')}")
+
+
+def stored_class(file: Path) -> Any:
+    """The class of the policy in a trusted file."""
+    from stable_baselines3.common.save_util import load_from_zip_file
+
+    data, _, _ = load_from_zip_file(file, device="cpu")
+    return (data or {})["policy_class"]
+
+
+def recognise(file: Path, fields: set[str], bases: list[str]) -> Algorithm:
+    """The algorithm that has saved these fields, with a policy whose class and bases are of these modules."""
+    for algorithm in ALGORITHMS:
+        by_module = algorithm.module and any(base.startswith(algorithm.module) for base in bases)
+        if by_module or algorithm.field in fields:
+            return algorithm
+    names = ", ".join(algorithm.name for algorithm in ALGORITHMS if algorithm.name not in UNSUPPORTED)
+    raise UserError(f"{file}: saved by an algorithm that is not known here; known are {names}")
+
+
+def guarded(file: Path, make: Callable[[], Any]) -> Any:
+    """What `make` reads from a trusted file, whatever a pickle does."""
+    try:
+        return make()
+    except Exception as error:
+        reason = next(iter(str(error).splitlines()), "")
+        raise UserError(f"{file}: cannot be loaded: {type(error).__name__}: {reason}") from None
