@@ -1,6 +1,6 @@
 """`phototaxis agent`: a learner as a process."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,16 +10,20 @@ from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
 from phototaxis.messages import Count, Seed, World
+from phototaxis.words import WORDS
 
 from phototaxis_agent.agent import Agent
+from phototaxis_agent.learner import POLICIES, load_point
 from phototaxis_agent.server import Mode, Server
-from phototaxis_agent.setup import parse_setup
+from phototaxis_agent.setup import Setup, parse_setup
 
 
 class Options(ComponentOptions, kw_only=True):
     """Options of the agent process."""
 
-    worlds: Annotated[str, Meta(pattern=r"^([A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*)?$")] = ""
+    worlds: Annotated[
+        str, Meta(pattern=r"^([A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*)?$", description=WORDS, examples=["a,b"])
+    ] = ""
     """in place of --name: several worlds, separated by commas, each driven by an agent of its own in this process"""
     checkpoint: str = ""
     """file to keep the learner's state in (.npz); with --worlds a folder, in it WORLD.npz"""
@@ -39,9 +43,6 @@ class Options(ComponentOptions, kw_only=True):
     """seed of the learner and its exploration (default: the run's)"""
 
 
-POLICIES = "phototaxis.policies"
-
-
 def policy_loader(file: Path, trusted: bool) -> Callable[[World, int], Any]:
     """Makes the agent for a policy file, by the entry point that is called as its suffix.
 
@@ -53,30 +54,39 @@ def policy_loader(file: Path, trusted: bool) -> Callable[[World, int], Any]:
     points = {point.name: point for point in entry_points(group=POLICIES)}
     point = points.get(file.suffix.removeprefix("."))
     if point is None:
-        raise UserError(f"--policy {file}: no policies of the kind '{file.suffix}'; there are: .{', .'.join(points)}")
-    try:
-        kind = point.load()
-    except ModuleNotFoundError as error:
-        line = (
-            f"--policy needs the package {error.name}; install it with: pip install 'phototaxis[gym]' stable-baselines3"
-        )
-        raise UserError(line) from None
-    return kind(file, trusted)
+        kinds = ", ".join(f".{name}" for name in points)
+        raise UserError(f"--policy {file}: no policies of the kind '{file.suffix}'; there are: {kinds}")
+    return load_point(point, f"--policy {file}: what reads it")(file, trusted)
+
+
+def read(argv: Sequence[str] | None, others: Iterable[str] = ()) -> tuple[Options, Setup]:
+    """The options and the agent of a command line, checked as far as that is possible without a world.
+
+    `others` are options that a mistyped one may have meant. `phototaxis up` calls this before it starts anything.
+
+    Raises
+    ------
+    UserError
+        for an unknown learner, one that cannot be made, or a value that does not fit.
+    """
+    about = "Run a learner that drives the robot."
+    options, setup = parse_setup(Options, argv, "phototaxis agent", about, others)
+    if options.take_over and options.standby:
+        raise UserError("--take-over and --standby exclude each other")
+    if options.policy and (options.checkpoint or options.resume):
+        raise UserError("--policy learns nothing: leave --checkpoint and --resume out")
+    return options, setup
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    options, setup = parse_setup(Options, argv, "phototaxis agent", "Run a learner that drives the robot.")
+    options, setup = read(argv)
     worlds = options.worlds.split(",") if options.worlds else []
     kept = Path(options.checkpoint) if options.checkpoint else None
     folder = kept if kept is None or worlds else kept.parent
     if folder is not None and not folder.is_dir():
         raise UserError(f"--checkpoint {kept}: there is no folder {folder}")
-    if options.take_over and options.standby:
-        raise UserError("--take-over and --standby exclude each other")
     mode: Mode = "take over" if options.take_over else "stand by" if options.standby else "claim"
 
-    if options.policy and (options.checkpoint or options.resume):
-        raise UserError("--policy learns nothing: leave --checkpoint and --resume out")
     load = policy_loader(Path(options.policy), options.trust) if options.policy else None
 
     def make(world: World) -> Agent:

@@ -17,6 +17,7 @@ from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.errors import one_line
 from phototaxis.session import BusOptions, open_session, reaching
+from phototaxis.words import WORD
 
 
 class ComponentOptions(BusOptions, kw_only=True):
@@ -24,9 +25,11 @@ class ComponentOptions(BusOptions, kw_only=True):
 
     tethered: bool = False
     """end when standard input closes, so that no process outlives the one that started it"""
-    id: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    id: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["robot-1"])] = ""
     """a word in its made-up name on the bus, by which `phototaxis health` finds it"""
-    ident: Annotated[str, Meta(max_length=24, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    ident: Annotated[str, Meta(max_length=24, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["robot-1"])] = (
+        ""
+    )
     """its whole name on the bus, which nobody else may have or have had (default: made up)"""
     restarted: bool = False
     """this process replaces one that died: continue from what that one left on disk, if anything"""

@@ -19,12 +19,15 @@ from msgspec import Meta, Struct
 
 from phototaxis.errors import Unavailable, UserError
 from phototaxis.topics import ROLES
+from phototaxis.words import WORD
 
 
 class BusOptions(Struct, kw_only=True):
     """Where the bus is. Without any of these: Unix sockets in a private folder of this machine."""
 
-    name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[A-Za-z0-9_.-]+$")] = "phototaxis"
+    name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[A-Za-z0-9_.-]+$", description=WORD)] = (
+        "phototaxis"
+    )
     """name of the world on the bus, the prefix of its keys; components of one world share it"""
     listen: list[str] = []
     """endpoint to listen on, such as tcp/127.0.0.1:7447 (may be repeated)"""

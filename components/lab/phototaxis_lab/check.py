@@ -12,6 +12,7 @@ from phototaxis.errors import UserError
 from phototaxis.options import parse
 from phototaxis.router import router_config, text
 from phototaxis.session import BusOptions
+from phototaxis.words import WORDS
 
 ROUTER = "deploy/zenoh/router.json5"
 WIRE = "docs/wire.md"
@@ -27,7 +28,7 @@ class Options(BusOptions, kw_only=True):
     whether a router's configuration says so. wire: whether the page about the wire format is up to date"""
     file: str = ""
     """rights, wire: the file to compare (default: the one in the repository)"""
-    worlds: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*$")] = "phototaxis"
+    worlds: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*$", description=WORDS)] = "phototaxis"
     """rights: names of the worlds, separated by commas"""
     write: bool = False
     """rights, wire: write the file instead of comparing it"""

@@ -13,8 +13,9 @@ from phototaxis.options import parse
 from phototaxis.rights import subject
 from phototaxis.router import Auth, client_config, router_config, text
 from phototaxis.topics import ROLES
+from phototaxis.words import WORDS
 
-NAMES = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*$")]
+NAMES = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]+(,[A-Za-z0-9_.-]+)*$", description=WORDS)]
 MADE_BY = "phototaxis certs"
 
 
@@ -25,9 +26,9 @@ class Options(Struct, kw_only=True):
     """folder to make; it must not exist"""
     worlds: NAMES = "phototaxis"
     """names of the worlds, separated by commas"""
-    host: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.:-]+$")] = "localhost"
+    host: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.:-]+$", description="a host's name or address")] = "localhost"
     """name or address under which the clients reach the router"""
-    listen: Annotated[str, Meta(pattern=r"^[0-9a-fA-F.:]+$")] = "127.0.0.1"
+    listen: Annotated[str, Meta(pattern=r"^[0-9a-fA-F.:]+$", description="an address in numbers")] = "127.0.0.1"
     """address that the router listens on; 0.0.0.0: all of its machine's"""
     port: Annotated[int, Meta(ge=1, le=65535)] = 7447
     """port of the router"""

@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -90,7 +91,7 @@ class Run:
             "agent": self._agent(agent_words),
         }  # fmt: skip
         for tick, learner in swaps:
-            self._agent(self._successor(["--learner", learner]), "--take-over", f"--at={tick}")
+            self._agent(successor(agent_words, ["--learner", learner]), "--take-over", f"--at={tick}")
         if not options.no_recorder:
             wanted = {"--grpc-port": options.grpc_port, "--web-port": options.web_port}
             grpc, web = find_ports("127.0.0.1", wanted)
@@ -113,13 +114,6 @@ class Run:
 
     def _checkpoint(self, name: str) -> Path:
         return self.folder / f"{name.replace('agent', 'checkpoint')}.npz"
-
-    def _successor(self, words: list[str]) -> list[str]:
-        """Words for a new agent: what the first one was given comes first, as far as it is not another learner's."""
-        if _learner(words) == _learner(self._words):
-            return [*self._words, *words]
-        percept = peek(self._words, "--percept", "")
-        return [*([f"--percept={percept}"] if percept else []), *words]
 
     def go(self, progress: Progress) -> Status:
         """Start, watch until finished or stopped, end; the last status.
@@ -182,7 +176,7 @@ class Run:
         request: Launch | None = event.message
         if request is None or event.reply is None:
             return
-        child = self._agent(self._successor(request.words), "--take-over")
+        child = self._agent(successor(self._words, request.words), "--take-over")
         child.start()
         self._pending.append((child, event))
         progress.say(f"asked to swap: {child.name} is started")
@@ -266,6 +260,14 @@ class Run:
         }
 
 
+def successor(first: list[str], words: list[str]) -> list[str]:
+    """Words for a new agent: what the first one was given comes first, as far as it is not another learner's."""
+    if _learner(words) == _learner(first):
+        return [*first, *words]
+    percept = peek(first, "--percept", "")
+    return [*([f"--percept={percept}"] if percept else []), *words]
+
+
 def swap_plan(text: str) -> list[tuple[int, str]]:
     """The ticks and learners of TICK:LEARNER,…; UserError when it is something else."""
     found = [SWAPS.fullmatch(part) for part in text.split(",")] if text else []
@@ -292,6 +294,8 @@ def parse(argv: Sequence[str], prog: str = "phototaxis up") -> tuple[UpOptions, 
     options = convert(UpOptions, vars(own))
     if options.listen:
         raise UserError(f"--listen is for single components; {prog} links its own, or uses a router with --connect")
+    for learner in {_learner(words), *(learner for _, learner in swap_plan(options.swap))}:
+        import_module("phototaxis_agent.__main__").read(successor(words, ["--learner", learner]), parser.option_strings)
     return options, convert(FmuOptions, vars(own)), words
 
 
