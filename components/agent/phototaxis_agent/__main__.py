@@ -70,7 +70,7 @@ def read(argv: Sequence[str] | None, others: Iterable[str] = ()) -> tuple[Option
         for an unknown learner, one that cannot be made, or a value that does not fit.
     """
     about = "Run a learner that drives the robot."
-    options, setup = parse_setup(Options, argv, "phototaxis agent", about, others)
+    options, setup = parse_setup(Options, argv, "phototaxis agent", about, others=others)
     if options.take_over and options.standby:
         raise UserError("--take-over and --standby exclude each other")
     if options.policy and (options.checkpoint or options.resume):

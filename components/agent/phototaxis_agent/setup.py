@@ -2,7 +2,8 @@
 
 import inspect
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -131,8 +132,8 @@ def parse_setup(
     argv: Sequence[str] | None,
     prog: str,
     about: str,
+    more: Mapping[str, type[Any]] = MappingProxyType({}),
     others: Iterable[str] = (),
-    **more: type[Any],
 ) -> tuple[Any, ...]:
     """Read a command's own options together with the agent's; the learner's own are known by its name.
 

@@ -16,8 +16,16 @@ from msgspec import Meta
 
 from phototaxis.bus import Bus
 from phototaxis.errors import one_line
-from phototaxis.session import BusOptions, open_session, reaching
+from phototaxis.session import BusOptions, open_session, place, reaching
 from phototaxis.words import WORD
+
+WAITS_FOR = {
+    "sim": "sensors and an agent",
+    "sensors": "a simulation",
+    "agent": "a simulation and its sensors",
+    "recorder": "a simulation, its sensors and an agent",
+}
+"""Whom a component needs before anything happens, by its role."""
 
 
 class ComponentOptions(BusOptions, kw_only=True):
@@ -50,6 +58,8 @@ def run(
             own = msgspec.structs.replace(options, name=name)
             session = stack.enter_context(open_session(role, own, ident))
             buses.append(stack.enter_context(Bus(session, name, role, ident, partial(reaching, session, own))))
+            line = f"{ident}: {role} of the world '{name}', {place(own)}; waits for {WAITS_FOR[role]}"
+            print(line, file=sys.stderr, flush=True)
         stop = partial(_stop, buses)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, stop)

@@ -3,6 +3,8 @@
 import sys
 from collections.abc import Callable
 
+from phototaxis import streams
+
 
 class UserError(Exception):
     """Something the user can mend: one line that says what, where and what to do.
@@ -29,6 +31,7 @@ class ComponentFailed(UserError):
 
 def one_line(main: Callable[[], int]) -> int:
     """Run a command's body; a `UserError` becomes its one line and exit code, Ctrl-C becomes 130."""
+    streams.prepare()
     try:
         return main()
     except UserError as error:

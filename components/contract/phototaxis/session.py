@@ -115,6 +115,11 @@ def reaching(own: zenoh.Session, options: BusOptions, ident: str) -> Iterator[ze
         yield passing
 
 
+def place(options: BusOptions) -> str:
+    """Where the bus is, in words."""
+    return f"through {found}" if (found := _elsewhere(options)) else "on this machine"
+
+
 def _elsewhere(options: BusOptions) -> str:
     """The configuration file, or the first endpoint, that leads elsewhere than to this machine's own sockets."""
     return next(iter([*options.listen, *options.connect]), "") or _file(options)

@@ -30,6 +30,7 @@ def plain(text: str) -> str:
     text = re.sub(r"of length ([<>]=)? ?(\d+)", lambda found: f"{_BOUNDS[found[1]]} {found[2]} characters", text)
     text = re.sub(r"(a list .*)characters", r"\1entries", text)
     text = re.sub(r" ([<>]=?) (?=[-\d])", lambda found: f" {_BOUNDS[found[1]]} ", text)
+    text = re.sub(r"Invalid enum value ('.*')", r"\1 is not one of the choices", text)
     return text.replace("Expected", "expected")
 
 

@@ -78,7 +78,7 @@ def _wire(options: Options) -> int:
     file = Path(options.file or WIRE)
     if options.write:
         _put(file, wire.page())
-    elif not file.exists() or file.read_text() != wire.page():
+    elif not file.exists() or file.read_text("utf-8") != wire.page():
         raise UserError(f"{file}: not up to date; write it anew with: phototaxis check wire --write")
     else:
         print(f"{file} is up to date", file=sys.stderr)
@@ -88,7 +88,7 @@ def _wire(options: Options) -> int:
 def _put(file: Path, content: str) -> None:
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(content)
+        file.write_text(content, "utf-8")
     except OSError as error:
         raise UserError(f"{file}: {error.strerror}") from None
     print(file, file=sys.stderr)

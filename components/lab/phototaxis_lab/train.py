@@ -35,7 +35,7 @@ def main(argv: Sequence[str]) -> int:
     from phototaxis_agent.setup import parse_setup
 
     about = "Learn in one process, without a bus; the same seeds give the same hashes as `phototaxis up`."
-    options, setup, fmus = parse_setup(Options, argv, "phototaxis train", about, **{"sensor models": FmuOptions})
+    options, setup, fmus = parse_setup(Options, argv, "phototaxis train", about, {"sensor models": FmuOptions})
     if options.checkpoint and options.seeds:
         raise UserError("--checkpoint keeps one learner, --seeds makes many; give one of the two")
     if options.checkpoint and not Path(options.checkpoint).parent.is_dir():

@@ -2,10 +2,12 @@
 
 import json
 import re
+import shutil
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated
@@ -68,10 +70,7 @@ class Run:
         swaps = swap_plan(options.swap)
         self.name = run_name()
         self.folder = Path(options.out).resolve() / self.name
-        try:
-            self.folder.mkdir(parents=True)
-        except OSError as error:
-            raise UserError(f"--out {options.out}: {error.strerror}") from None
+        self._begun = False
         self.checkpoint = self._checkpoint("agent")
         """That of the agent that drove last."""
         self.recording = self.folder / "recording.rrd"
@@ -122,6 +121,7 @@ class Run:
         """
         status = Status(self.name, "waiting")
         with (
+            self._folder_of_a_run(),
             open_session("launcher", self._options) as session,
             Bus(session, self._options.name, "launcher", f"up-{self.name}") as bus,
         ):
@@ -143,6 +143,7 @@ class Run:
                         self._launch(event, progress)
                     if event is not None and event.topic == "status":
                         status = event.message
+                        self._begun = self._begun or status.tick > 0
                         progress.show(status)
                         self._report(status, progress)
                         self._confirm(status)
@@ -152,6 +153,24 @@ class Run:
                 progress.close()
                 self.stop()
         return status
+
+    @contextmanager
+    def _folder_of_a_run(self) -> Iterator[None]:
+        """Make the run's folder; a run that the user's input or a missing peer kept from beginning leaves none."""
+        made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
+        try:
+            self.folder.mkdir(parents=True)
+        except OSError as error:
+            raise UserError(f"--out {self._options.out}: {error.strerror}") from None
+        try:
+            yield
+        except UserError as error:
+            if not self._begun and not isinstance(error, ComponentFailed):
+                shutil.rmtree(self.folder, ignore_errors=True)
+                with suppress(OSError):  # somebody else's files are in it by now
+                    for path in made[1:]:
+                        path.rmdir()
+            raise
 
     def _complete(self, status: Status) -> bool:
         """Finished, and all are there to take part in the ending (one may just have been restarted)."""

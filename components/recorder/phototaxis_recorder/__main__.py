@@ -52,6 +52,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     def start(world: World) -> Translator:
         nonlocal file
         file = fresh_file(output / f"{world.run}.rrd" if output.is_dir() else output)
+        print(f"recorder: records the run {world.run} into {file}", file=sys.stderr, flush=True)
         recording.append(open_recording(world, file, options.bind, grpc_port, options.memory))
         return Translator(recording[0], world)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError
+from phototaxis.words import known, plain
 
 _FOLDER = resources.files("phototaxis_sim") / "arenas"
 _LIMIT = 16_000_000
@@ -29,11 +30,11 @@ def load(name: str) -> Arena:
         return parse((_FOLDER / f"{name}.toml").read_text("utf-8"), name)
     path = Path(name)
     if not path.is_file():
-        raise UserError(f"no arena '{name}': neither a file nor one of {', '.join(shipped())}")
+        raise UserError(f"no arena '{name}': neither a file nor one that is shipped; {known(name, shipped())}")
     if path.stat().st_size > _LIMIT:
         raise UserError(f"{name}: larger than {_LIMIT} bytes, not an arena")
     try:
-        return parse(path.read_text("utf-8"), name)
+        return parse(path.read_text("utf-8-sig"), name)
     except UnicodeDecodeError:
         raise UserError(f"{name}: not a text file in UTF-8") from None
 
@@ -63,8 +64,7 @@ def _explain(text: str) -> str:
     missing = re.fullmatch(r"Object missing required field `(.*)`", what)
     if missing:
         return f"{'.'.join(filter(None, [where, missing[1]]))}: missing"
-    what = what.replace("Expected `array`", "expected a list").replace("Expected", "expected")
-    return f"{where}: {what}"
+    return f"{where}: {plain(what)}"
 
 
 def _problems(arena: Arena) -> list[str]:
