@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 import gymnasium
 import numpy as np
 import torch
+from phototaxis_lab.progress import Progress
 from torch import nn
 
 NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
@@ -68,7 +69,10 @@ def train(options: Options) -> nn.Module:
     torch.manual_seed(options.seed)
     rng = np.random.default_rng(options.seed)
     where = {"connect": options.connect, "world": options.world} if options.connect else {}
-    robots = gymnasium.make_vec(NAME, num_envs=options.robots, percept="continuous", cap=100, **where)
+    try:
+        robots = gymnasium.make_vec(NAME, num_envs=options.robots, percept="continuous", cap=100, **where)
+    except gymnasium.error.Error as error:
+        raise SystemExit(str(error)) from None
     inputs, actions = robots.single_observation_space.shape[0], robots.single_action_space.n
     net, target = network(inputs, actions), network(inputs, actions)
     target.load_state_dict(net.state_dict())
@@ -76,7 +80,9 @@ def train(options: Options) -> nn.Module:
     memory: list[tuple] = []
     seen, _ = robots.reset(seed=options.seed)
     over, updates = np.zeros(options.robots, bool), 0
+    progress = Progress(options.steps, "steps")
     for step in range(0, options.steps, options.robots):
+        progress.add(options.robots)
         used = min(step / (options.explore * options.steps), 1.0)
         with torch.no_grad():
             action = net(torch.tensor(seen)).argmax(1).numpy()
@@ -101,6 +107,7 @@ def train(options: Options) -> nn.Module:
             updates += 1
             if updates % options.target == 0:
                 target.load_state_dict(net.state_dict())
+    progress.close()
     robots.close()
     return net
 

@@ -13,9 +13,17 @@ from queue import Empty, SimpleQueue
 import msgpack
 import zenoh
 
+if len(sys.argv) < 2:
+    sys.exit("where is the router? as in: python examples/foreign_agent.py tcp/127.0.0.1:7447 [WORLD]")
 endpoint, world, me = sys.argv[1], "".join(sys.argv[2:3]) or "phototaxis", "chaser"
-config = {"mode": "client", "connect": {"endpoints": [endpoint]}, "scouting": {"multicast": {"enabled": False}}}
-with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
+connect = {"endpoints": [endpoint], "timeout_ms": 2000, "exit_on_failure": True}
+config = {"mode": "client", "connect": connect, "scouting": {"multicast": {"enabled": False}}}
+try:
+    session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
+except zenoh.ZError:
+    sys.exit(f"no router answers at {endpoint}; start one with: phototaxis router --listen {endpoint}")
+with session:
+    print(f"{me} waits for the world {world} at {endpoint}", file=sys.stderr)
     inbox: SimpleQueue = SimpleQueue()
     publisher = session.declare_publisher(f"{world}/command", congestion_control=zenoh.CongestionControl.BLOCK)
     session.declare_subscriber(
@@ -26,8 +34,8 @@ with zenoh.open(zenoh.Config.from_json5(json.dumps(config))) as session:
     while True:
         try:
             readings = inbox.get(timeout=30)
-        except Empty:
-            break  # the world is gone
+        except (Empty, KeyboardInterrupt):
+            break  # the world is gone, or Ctrl-C
         if readings["run"] != run:
             run, newest = readings["run"], -1
         if not readings["driver"]:

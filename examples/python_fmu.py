@@ -36,3 +36,7 @@ class TiringEye(Fmi2Slave):
         self.reading = light * (1 - 0.04 * self.tired)
         self.tired += (light - self.tired) * step_size / self.recovery
         return True
+
+
+if __name__ == "__main__":
+    raise SystemExit("this is the source of an FMU; build it: python -m pythonfmu build -f examples/python_fmu.py")

@@ -12,6 +12,7 @@ import argparse
 
 import gymnasium
 import numpy as np
+from phototaxis_lab.progress import Progress
 from stable_baselines3 import DQN, PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 
@@ -53,10 +54,14 @@ def main() -> None:
     parser.add_argument("--save", help="file for the policy")
     options = parser.parse_args()
     where = {"connect": options.connect, "world": options.world} if options.connect else {}
-    environment = gymnasium.make(NAME, percept="continuous", cap=100, **where)
+    try:
+        environment = gymnasium.make(NAME, percept="continuous", cap=100, **where)
+    except gymnasium.error.Error as error:
+        raise SystemExit(str(error)) from None
     algorithm = {"dqn": DQN, "ppo": PPO}[options.learner]
     model = algorithm("MlpPolicy", environment, seed=options.seed, device="cpu", **HYPERPARAMETERS[options.learner])
-    model.learn(options.steps)
+    with Progress(options.steps, "steps") as progress:
+        model.learn(options.steps, callback=lambda *_: progress.add() is None)
     environment.close()
     if options.save:
         model.save(options.save)

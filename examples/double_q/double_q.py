@@ -47,3 +47,7 @@ class DoubleQ(Learner):
 
     def load(self, arrays: dict[str, np.ndarray]) -> None:
         self._tables[:] = stored(arrays, "tables", self._tables)
+
+
+if __name__ == "__main__":
+    raise SystemExit("this is a plug-in: pip install ./examples/double_q, then phototaxis train --learner double-q")

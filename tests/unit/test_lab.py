@@ -1,15 +1,16 @@
 """Experiments: statistics that can be checked by hand, results that survive a kill, clear refusals."""
 
 import json
+from codecs import BOM_UTF8
 from math import comb
 from pathlib import Path
 
 import numpy as np
 import pytest
-from phototaxis.errors import UserError
+from phototaxis.errors import Unavailable, UserError
 from phototaxis_lab.cell import Cell, Outcome, System, learn, run
 from phototaxis_lab.experiment import Options, cells, main
-from phototaxis_lab.results import Results
+from phototaxis_lab.results import Results, alone_in
 from phototaxis_lab.running import seed_range
 from phototaxis_lab.statistics import difference_interval, mean_interval, median_interval
 from phototaxis_sim import arenas
@@ -66,10 +67,37 @@ def test_results_continue_where_they_were_killed(tmp_path: Path):
     assert Results(tmp_path / "r", grid).done == {2: outcome(2), 0: outcome(0)}
 
 
-def test_results_of_another_grid_are_refused(tmp_path: Path):
-    Results(tmp_path, [TINY])
-    with pytest.raises(UserError, match="holds the results of another grid"):
-        Results(tmp_path, [Cell(System("qtable"), 61, 0)])
+@pytest.mark.parametrize("more", [Cell(TINY.system, 60, 1), Cell(TINY.system, 61, 0), Cell(System("qlambda"), 60, 0)])
+def test_a_folder_is_extended_by_more_seeds_epochs_and_systems(tmp_path: Path, more: Cell):
+    Results(tmp_path, [TINY]).add(0, outcome(0))
+    both = Results(tmp_path, [TINY, more])
+    assert both.missing == [1]
+    both.add(1, outcome(1))
+    assert Results(tmp_path, [more]).done == {0: outcome(1)}
+    assert Results(tmp_path, [TINY]).done == {0: outcome(0)}
+
+
+def test_a_folder_has_one_experiment_at_a_time(tmp_path: Path):
+    with alone_in(tmp_path / "r"), pytest.raises(Unavailable, match="another experiment computes there"):
+        main(["--epochs", "50", "--seeds", "0:1", "--jobs", "1", "--out", str(tmp_path / "r")])
+    with alone_in(tmp_path / "r"):
+        assert not list((tmp_path / "r").iterdir())
+
+
+@pytest.mark.parametrize(("text", "line"), [("garbage", "grid.json: damaged"), (None, "grid.json: missing")])
+def test_results_whose_meaning_is_lost_are_refused(tmp_path: Path, text: str | None, line: str):
+    Results(tmp_path, [TINY]).add(0, outcome(0))
+    (tmp_path / "grid.json").unlink() if text is None else (tmp_path / "grid.json").write_text(text)
+    with pytest.raises(UserError, match=line):
+        Results(tmp_path, [TINY])
+
+
+def test_results_that_an_editor_has_touched_are_read(tmp_path: Path):
+    Results(tmp_path, [TINY]).add(0, outcome(0))
+    for name in ("grid.json", "results.jsonl"):
+        file = tmp_path / name
+        file.write_bytes(BOM_UTF8 + file.read_bytes())
+    assert Results(tmp_path, [TINY]).done == {0: outcome(0)}
 
 
 def test_results_in_an_arena_that_was_changed_are_another_grids(tmp_path: Path):
@@ -80,7 +108,7 @@ def test_results_in_an_arena_that_was_changed_are_another_grids(tmp_path: Path):
     Results(tmp_path / "r", grid)
     Results(tmp_path / "r", grid)
     mine.write_text(text.replace("brightness = 1.0", "brightness = 0.9"))
-    with pytest.raises(UserError, match="holds the results of another grid"):
+    with pytest.raises(UserError, match=r"holds results of 'qtable .*' in another arena"):
         Results(tmp_path / "r", grid)
 
 
@@ -103,19 +131,20 @@ def test_a_grid_is_every_combination():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--learners", "qtabel"], "no learner 'qtabel'; there are: ann, .*qtable"),
-        (["--percepts", "richer"], "--percept richer: no such percept; there are: simple, rich, continuous"),
+        (["--learners", "qtabel"], "no learner 'qtabel'; did you mean qtable[?] there are: ann, .*qtable"),
+        (["--percepts", "richer"], "percept richer: no such percept; did you mean rich[?] there are: simple, rich"),
         (
             ["--learners", "mirror", "--percepts", "continuous"],
             "--percept continuous: .*countable states: simple, rich",
         ),
-        (["--rewards", "gold"], "--reward gold: no such reward; there are: own, difference, static, potential"),
+        (["--rewards", "gold"], "reward gold: no such reward; there are: own, difference, static, potential"),
         (["--epochs", "300,0"], "--epochs 0: expected whole numbers above 0"),
         (["--seeds", "4:4"], "--seeds 4:4: no seed from 4 to 4"),
-        (["--seeds", "4"], "--seeds 4: .*"),
+        (["--seeds", "4"], "--seeds 4: expected A:B, the seeds from A to B − 1, as in 0:20"),
+        (["--set", "percept=rich"], "--set percept=rich: give it as --percepts rich"),
         (["--set", "gamma"], "--set gamma: expected NAME=VALUE"),
-        (["--set", "gamma=2"], "--gamma 2: .*"),
-        (["--set", "gama=0.2"], "no option 'gama' of the learner qtable; there are: .*gamma"),
+        (["--set", "gamma=2"], "gamma 2: expected a number below 1.0, as in 0.75"),
+        (["--set", "gama=0.2"], "no option 'gama' of the learner qtable; did you mean gamma[?] there are: .*gamma"),
         (["--arena", "atlantis"], "atlantis"),
         (["--backend", "dask"], "--backend dask needs the address of a scheduler"),
         (["--out", "/proc/nothing"], "/proc/nothing: "),

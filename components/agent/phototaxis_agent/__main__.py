@@ -1,6 +1,6 @@
 """`phototaxis agent`: a learner as a process."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from phototaxis.bus import Bus
@@ -13,7 +13,7 @@ from phototaxis.session import WorldNames
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.policies import load_policy
 from phototaxis_agent.server import Mode, Server
-from phototaxis_agent.setup import parse_setup
+from phototaxis_agent.setup import Setup, parse_setup
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -41,21 +41,36 @@ class Options(ComponentOptions, kw_only=True):
     """seed of the learner and its exploration (default: the run's)"""
 
 
+def read(argv: Sequence[str] | None, others: Iterable[str] = ()) -> tuple[Options, Setup]:
+    """The options and the agent of a command line, checked as far as that is possible without a world.
+
+    `others` are options that a mistyped one may have meant. `phototaxis up` calls this before it starts anything.
+
+    Raises
+    ------
+    UserError
+        for an unknown learner, one that cannot be made, or a value that does not fit.
+    """
+    about = "Run a learner that drives the robot."
+    options, setup = parse_setup(Options, argv, "phototaxis agent", about, others=others)
+    if options.take_over and options.standby:
+        raise UserError("--take-over and --standby exclude each other")
+    if options.policy and (options.checkpoint or options.resume):
+        raise UserError("--policy learns nothing: leave --checkpoint and --resume out")
+    if options.normalize and not options.policy:
+        raise UserError("--normalize belongs to a policy: give its file, too: --policy FILE.zip")
+    return options, setup
+
+
 def main(argv: Sequence[str] | None = None) -> None:
-    options, setup = parse_setup(Options, argv, "phototaxis agent", "Run a learner that drives the robot.")
+    options, setup = read(argv)
     worlds = options.worlds.split(",") if options.worlds else []
     kept = Path(options.checkpoint) if options.checkpoint else None
     for file in [] if kept is None else [kept / f"{name}.npz" for name in worlds] or [kept]:
         try_file(file, "--checkpoint")
         try_file(file.with_suffix(".journal"), "--checkpoint")
-    if options.take_over and options.standby:
-        raise UserError("--take-over and --standby exclude each other")
     mode: Mode = "take over" if options.take_over else "stand by" if options.standby else "claim"
 
-    if options.policy and (options.checkpoint or options.resume):
-        raise UserError("--policy learns nothing: leave --checkpoint and --resume out")
-    if options.normalize and not options.policy:
-        raise UserError("--normalize belongs to a policy: give its file, too: --policy FILE.zip")
     load = load_policy(Path(options.policy), options.trust, options.normalize) if options.policy else None
 
     def make(world: World) -> Agent:

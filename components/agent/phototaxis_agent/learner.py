@@ -1,13 +1,20 @@
 """What a learner is, and how one is found by its name."""
 
+import sys
+from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from msgspec import Struct
 from phototaxis.errors import UserError
 from phototaxis.task import PERCEPTS, Percept, State
+from phototaxis.words import known, told
 
 GROUP = "phototaxis.learners"
+POLICIES = "phototaxis.policies"
+HINTS = {GROUP: "'phototaxis[agent]'", POLICIES: "'phototaxis[gym]' stable-baselines3"}
+"""What brings the packages that our own entry points need."""
 
 
 class Transition(NamedTuple):
@@ -116,9 +123,43 @@ def find(name: str) -> type[Learner]:
     Raises
     ------
     UserError
-        when there is none; it lists those that exist.
+        when there is none (it lists those that exist), it cannot be loaded, or is not a learner.
     """
     points = available()
     if name not in points:
-        raise UserError(f"no learner '{name}'; there are: {', '.join(points) or 'none'}")
-    return points[name].load()
+        raise UserError(f"no learner '{name}'; {known(name, points)}")
+    kind = load_point(points[name], f"the learner '{name}'")
+    if problem := _problem(kind):
+        raise UserError(f"the learner '{name}' ({points[name].value}) {problem}")
+    return kind
+
+
+def _problem(kind: Any) -> str:
+    """Why an object is not the class of a learner; "" when it is."""
+    if not (isinstance(kind, type) and issubclass(kind, Learner)):
+        return "is not a subclass of phototaxis_agent.learner.Learner"
+    options = getattr(kind, "Options", None)
+    if not (isinstance(options, type) and issubclass(options, Struct)):
+        return "needs Options, a msgspec.Struct whose fields are its hyperparameters"
+    for method in ("values", "learn", "save", "load"):
+        if getattr(kind, method) is getattr(Learner, method):
+            return f"has no method {method}"
+    return ""
+
+
+def load_point(point: EntryPoint, what: str) -> Any:
+    """What an entry point names; `what` says in errors what it is.
+
+    Raises
+    ------
+    UserError
+        when it cannot be imported, whatever the reason; it names the file and the line.
+    """
+    try:
+        return point.load()
+    except (Exception, SystemExit) as error:
+        module = sys.modules.get(point.module) or PathFinder.find_spec(point.module)
+        file = getattr(module, "__file__", None) or getattr(module, "origin", None)
+        ours = isinstance(error, ModuleNotFoundError) and point.dist is not None and point.dist.name == "phototaxis"
+        hint = f"; install it with: pip install {HINTS[point.group]}" if ours else ""
+        raise UserError(f"{what} cannot be loaded from {point.value}: {told(error, file)}{hint}") from None

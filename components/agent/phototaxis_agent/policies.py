@@ -6,7 +6,7 @@ from typing import Any
 
 from phototaxis.errors import UserError
 
-POLICIES = "phototaxis.policies"
+from phototaxis_agent.learner import POLICIES, load_point
 
 
 def is_policy(file: Path) -> bool:
@@ -27,12 +27,7 @@ def load_policy(file: Path, trusted: bool, normalize: str = "") -> Any:
     points = {point.name: point for point in entry_points(group=POLICIES)}
     point = points.get(file.suffix.removeprefix("."))
     if point is None:
-        raise UserError(f"--policy {file}: no policies of the kind '{file.suffix}'; there are: .{', .'.join(points)}")
-    try:
-        kind = point.load()
-    except ModuleNotFoundError as error:
-        line = (
-            f"--policy needs the package {error.name}; install it with: pip install 'phototaxis[gym]' stable-baselines3"
-        )
-        raise UserError(line) from None
+        kinds = ", ".join(f".{name}" for name in points)
+        raise UserError(f"--policy {file}: no policies of the kind '{file.suffix}'; there are: {kinds}")
+    kind = load_point(point, f"--policy {file}: what reads it")
     return kind(file, trusted, Path(normalize)) if normalize else kind(file, trusted)

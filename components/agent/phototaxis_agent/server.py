@@ -161,10 +161,16 @@ class Server:
             if not readings.driver:
                 self._claim_at = now + CLAIM_EVERY
                 self._bus.control(Control("claim", self._bus.ident))
+            elif not self._enlisted:
+                self._enlisted = True
+                self._say(f"waits until {readings.driver} leaves the seat; --take-over takes it, --standby inherits it")
         elif not self._enlisted:
             self._claim_at = now + CLAIM_EVERY
             reply = self._bus.control(Control(self._mode, self._bus.ident, at=self._at))
             self._enlisted = reply is not None and reply.ok
+            if self._enlisted:
+                waits = "stands by" if self._mode == "stand by" else f"takes over from tick {self._at} on"
+                self._say(f"{waits}; {readings.driver or 'nobody'} drives at tick {readings.tick}")
 
     def _follow(self, session: Session, readings: Readings) -> None:
         """Learn from what another driver does; a standby of its kind keeps in step with it."""

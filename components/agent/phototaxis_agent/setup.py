@@ -1,7 +1,9 @@
 """From a command line to an agent: the same options over the bus and in one process."""
 
+import inspect
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -11,6 +13,7 @@ from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import convert, parse_groups, peek
 from phototaxis.task import TaskOptions
+from phototaxis.words import known, plain, told
 
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.exploration import Exploration
@@ -35,18 +38,33 @@ class Setup(Struct):
     def agent(
         self, world: World, *, seed: int | None = None, budget: int | None = None, learning: bool = True
     ) -> Agent:
-        """An agent for a world; `seed` and `budget` are the world's unless they are given."""
-        return Agent(
-            self.learner,
-            self.hyperparameters,
-            self.task,
-            self.exploration,
+        """An agent for a world; `seed` and `budget` are the world's unless they are given.
+
+        Raises
+        ------
+        UserError
+            when the learner does not go with the percept, or raises; then it names the file and the line.
+        """
+        return self._make(
             near=world.arena.sensing.near,
             seed=world.seed if seed is None else seed,
             budget=budget or world.epochs or DEFAULT_BUDGET,
             learning=learning,
             arena=world.arena,
         )
+
+    def check(self) -> None:
+        """Make the agent and throw it away: a UserError before anything else is started, as from `agent`."""
+        self._make(near=1.0, seed=0, budget=1)
+
+    def _make(self, **given: Any) -> Agent:
+        try:
+            return Agent(self.learner, self.hyperparameters, self.task, self.exploration, **given)
+        except UserError:
+            raise
+        except (Exception, SystemExit) as error:
+            file = inspect.getsourcefile(find(self.learner))
+            raise UserError(f"the learner '{self.learner}' cannot be made: {told(error, file)}") from None
 
 
 def presets(learner: str, percept: str) -> dict[str, Any]:
@@ -64,12 +82,26 @@ def make_setup(learner: str = "qtable", **given: Any) -> Setup:
         for an unknown learner or option, or a value that does not fit.
     """
     structs = find(learner).Options, TaskOptions, Exploration
-    known = {field for struct in structs for field in struct.__struct_fields__}
-    if unknown := sorted(given.keys() - known):
-        raise UserError(f"no option '{unknown[0]}' of the learner {learner}; there are: {', '.join(sorted(known))}")
+    _refuse_doubles(learner, structs[1:])
+    options = {field for struct in structs for field in struct.__struct_fields__}
+    if unknown := sorted(given.keys() - options):
+        raise UserError(f"no option '{unknown[0]}' of the learner {learner}; {known(unknown[0], sorted(options))}")
     values = {**presets(learner, given.get("percept", TaskOptions().percept)), **given}
     own, task, exploration = structs
-    return Setup(learner, convert(own, values), convert(task, values), convert(exploration, values))
+    parts = convert(own, values, str), convert(task, values, str), convert(exploration, values, str)
+    return Setup(learner, *parts)
+
+
+def _refuse_doubles(learner: str, structs: Iterable[type[Any]], others: Iterable[str] = ()) -> None:
+    """Raise UserError for a hyperparameter that is called as a field of `structs` or as one of the options `others`."""
+    taken = {"learner", "help", *(field for struct in structs for field in struct.__struct_fields__)}
+    taken |= {option.removeprefix("--").replace("-", "_") for option in others}
+    for field in find(learner).Options.__struct_fields__:
+        if field in taken:
+            raise UserError(
+                f"the learner '{learner}' calls a hyperparameter '{field}', which is an option of Phototaxis itself; "
+                "give it another name"
+            )
 
 
 DEFAULT_BUDGET = 3000
@@ -92,23 +124,31 @@ def from_checkpoint(meta: Meta, source: str) -> Setup:
             msgspec.convert(meta.exploration, Exploration),
         )
     except msgspec.ValidationError as error:
-        raise UserError(f"{source}: {error}") from None
+        raise UserError(f"{source}: {plain(str(error))}") from None
 
 
 def parse_setup(
-    struct: type[Any], argv: Sequence[str] | None, prog: str, about: str, **more: type[Any]
+    struct: type[Any],
+    argv: Sequence[str] | None,
+    prog: str,
+    about: str,
+    more: Mapping[str, type[Any]] = MappingProxyType({}),
+    others: Iterable[str] = (),
 ) -> tuple[Any, ...]:
     """Read a command's own options together with the agent's; the learner's own are known by its name.
 
-    `more` are further groups of options by their title. The result: own options, setup, further ones.
+    `more` are further groups of options by their title, `others` options that a mistyped one may have meant.
+    The result: own options, setup, further ones.
 
     Raises
     ------
     UserError
-        for an unknown learner or a value that does not fit.
+        for an unknown learner, one that cannot be made, or a value that does not fit.
     """
     words = sys.argv[1:] if argv is None else argv
     name = peek(words, "--learner", LearnerOptions().learner)
+    others = [*others]
+    _refuse_doubles(name, [struct, TaskOptions, Exploration, *more.values()], others)
     groups = {
         "": struct,
         "learner": LearnerOptions,
@@ -118,6 +158,9 @@ def parse_setup(
         **more,
     }
     defaults = presets(name, peek(words, "--percept", TaskOptions().percept))
-    parsed = parse_groups(groups, words, prog, about, defaults=defaults)
-    own, chosen, task, exploration, hyperparameters, *others = parsed
-    return own, Setup(chosen.learner, hyperparameters, task, exploration), *others
+    see = f"{prog} --learner {name}"
+    parsed = parse_groups(groups, words, prog, about, defaults=defaults, more=others, see=see)
+    own, chosen, task, exploration, hyperparameters, *rest = parsed
+    setup = Setup(chosen.learner, hyperparameters, task, exploration)
+    setup.check()
+    return own, setup, *rest

@@ -16,8 +16,16 @@ from msgspec import Meta
 
 from phototaxis.bus import Bus
 from phototaxis.errors import leave, one_line
-from phototaxis.session import BusOptions, open_session, reaching
-from phototaxis.stderr import may_be_lost
+from phototaxis.session import BusOptions, open_session, place, reaching
+from phototaxis.words import WORD
+
+WAITS_FOR = {
+    "sim": "sensors and an agent",
+    "sensors": "a simulation",
+    "agent": "a simulation and its sensors",
+    "recorder": "a simulation, its sensors and an agent",
+}
+"""Whom a component needs before anything happens, by its role."""
 
 
 class ComponentOptions(BusOptions, kw_only=True):
@@ -25,9 +33,11 @@ class ComponentOptions(BusOptions, kw_only=True):
 
     tethered: bool = False
     """end when standard input closes, so that no process outlives the one that started it"""
-    id: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    id: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["robot-1"])] = ""
     """a word in its made-up name on the bus, by which `phototaxis health` finds it"""
-    ident: Annotated[str, Meta(max_length=24, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    ident: Annotated[str, Meta(max_length=24, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["robot-1"])] = (
+        ""
+    )
     """its whole name on the bus, which nobody else may have or have had (default: made up)"""
     restarted: bool = False
     """this process replaces one that died: continue from what that one left on disk, if anything"""
@@ -48,6 +58,8 @@ def run(
             own = msgspec.structs.replace(options, name=name)
             session = stack.enter_context(open_session(role, own, ident))
             buses.append(stack.enter_context(Bus(session, name, role, ident, partial(reaching, session, own))))
+            line = f"{ident}: {role} of the world '{name}', {place(own)}; waits for {WAITS_FOR[role]}"
+            print(line, file=sys.stderr, flush=True)
         stop = partial(_stop, buses)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, stop)
@@ -88,5 +100,4 @@ def entry(body: Callable[[], None]) -> None:
         body()
         return 0
 
-    may_be_lost()
     leave(one_line(main))

@@ -6,6 +6,8 @@ import threading
 from collections.abc import Callable
 from typing import NoReturn
 
+from phototaxis import streams
+
 LEAVE_WITHIN = 2.0
 """Seconds that threads get to end when the program ends."""
 
@@ -47,6 +49,7 @@ def warn(line: str) -> None:
 
 def one_line(main: Callable[[], int]) -> int:
     """Run a command's body; a `UserError` becomes its one line and exit code, Ctrl-C becomes 130."""
+    streams.prepare()
     try:
         return main()
     except UserError as error:

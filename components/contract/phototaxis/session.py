@@ -15,7 +15,7 @@ from msgspec import Meta, Struct
 
 from phototaxis import doors
 from phototaxis.errors import Unavailable, UserError
-from phototaxis.sockets import agent_socket, alone_in, in_use, socket_folder, sweep
+from phototaxis.sockets import agent_socket, one_after_another, in_use, socket_folder, sweep
 from phototaxis.topics import ROLES
 
 _WORLD = r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,39}"
@@ -84,6 +84,11 @@ def reaching(own: zenoh.Session, options: BusOptions, ident: str) -> Iterator[ze
         return
     with passing:
         yield passing
+
+
+def place(options: BusOptions) -> str:
+    """Where the bus is, in words."""
+    return f"through {found}" if (found := _elsewhere(options)) else "on this machine"
 
 
 def _elsewhere(options: BusOptions) -> str:
@@ -176,7 +181,7 @@ def open_router(options: BusOptions) -> zenoh.Session:
 def _open_local(role: str, name: str, ident: str) -> zenoh.Session:
     """A session on this machine's own sockets."""
     config, folder = local_config(role, name, ident), socket_folder(name)
-    with alone_in(folder) if role == "agent" else nullcontext():
+    with one_after_another(folder) if role == "agent" else nullcontext():
         if role == "agent":
             sweep(folder)
         try:

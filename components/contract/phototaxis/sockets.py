@@ -98,7 +98,7 @@ def in_use(socket: Path) -> bool:
 
 
 @contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
+def one_after_another(folder: Path) -> Iterator[None]:
     """Agents that start at the same moment sweep and open one after another: a socket that has just been made,
     but is not yet locked, would look like one that a killed agent left."""
     descriptor = os.open(folder, os.O_RDONLY)

@@ -15,7 +15,7 @@ PAGE = files("phototaxis") / "wire.md.in"
 def page() -> str:
     """docs/wire.md."""
     defaults = {name: value.default for name, value in _parameters(protocol.Question).items()}
-    return Template(PAGE.read_text()).substitute(
+    return Template(PAGE.read_text(encoding="utf-8")).substitute(
         schema=messages.SCHEMA,
         topics=topics.table(),
         limits=_limits(),

@@ -46,7 +46,8 @@ def main(argv: Sequence[str]) -> int:
     if options.what == "agent":
         from phototaxis_lab.check_agent import check
 
-        return check(options, options.ticks, options.within, options.patience)
+        bus = BusOptions(**{field: getattr(options, field) for field in BusOptions.__struct_fields__})
+        return check(bus, options.ticks, options.within, options.patience)
     return _rights(options) if options.what == "rights" else _wire(options)
 
 

@@ -9,6 +9,7 @@ from phototaxis.bus import Bus, Event
 from phototaxis.codec import encode
 from phototaxis.errors import ComponentFailed, Unavailable
 from phototaxis.messages import Command, Control, ControlReply, Readings, Status, World, run_name
+from phototaxis.options import flags
 from phototaxis.session import BusOptions, open_session
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim import arenas
@@ -32,17 +33,19 @@ def check(options: BusOptions, ticks: int, within: float, patience: float) -> in
     Raises
     ------
     Unavailable
-        when no agent comes in `patience` seconds.
+        when a run is up in that world, or no agent comes in `patience` seconds.
     ComponentFailed
         when a clause is broken.
     """
+    _refuse_a_run(options)
     with (
         open_session("sim", options) as session,
         open_session("sensors", options) as other,
         Bus(session, options.name, "sim", "check") as sim,
         Bus(other, options.name, "sensors", "check") as sensors,
     ):
-        print(f"waiting for an agent in the world '{options.name}'", file=sys.stderr, flush=True)
+        line = f"waiting for an agent in the world '{options.name}', as: phototaxis agent {' '.join(flags(options))}"
+        print(line.rstrip(), file=sys.stderr, flush=True)
         broken = 0
         for verdict in Trial(sim, sensors, within, patience).run(ticks):
             broken += bool(verdict.fault)
@@ -53,6 +56,16 @@ def check(options: BusOptions, ticks: int, within: float, patience: float) -> in
     if broken:
         raise ComponentFailed(f"the agent breaks {broken} clause{'s' if broken > 1 else ''} of the contract")
     return 0
+
+
+def _refuse_a_run(options: BusOptions) -> None:
+    """Raise Unavailable when there is a simulation already: the check is one itself, and two contradict each other."""
+    with open_session("observer", options) as session, Bus(session, options.name, "observer", "check") as bus:
+        if bus.wait_for("sim", SILENCE):
+            raise Unavailable(
+                f"a run is up in the world '{options.name}', and this check plays the simulation itself; give it and "
+                "the agent a world of their own: --name trial"
+            )
 
 
 class Trial:

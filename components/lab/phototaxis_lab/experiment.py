@@ -12,7 +12,7 @@ from phototaxis.options import parse
 
 from phototaxis_lab.running import SEEDS, Running, seed_range
 
-LIST = Annotated[str, Meta(pattern=r"^[^, ]+(,[^, ]+)*$")]
+LIST = Annotated[str, Meta(pattern=r"^[^, ]+(,[^, ]+)*$", description="a list with commas and without spaces")]
 
 
 class Options(Running, kw_only=True):
@@ -68,10 +68,12 @@ def _pair(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals:
         raise UserError(f"--set {text}: expected NAME=VALUE, as in gamma=0.9")
+    if name in ("learner", "percept", "reward"):
+        raise UserError(f"--set {text}: give it as --{name}s {value}")
     return name.replace("-", "_"), value
 
 
 def _steps(text: str) -> int:
     if not text.isdecimal() or not int(text):
-        raise UserError(f"--epochs {text}: expected whole numbers above 0, separated by commas")
+        raise UserError(f"--epochs {text}: expected whole numbers above 0, separated by commas, as in 300,3000")
     return int(text)

@@ -1,52 +1,46 @@
 """Computing many cells, and what they come to."""
 
 import sys
-import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from phototaxis.errors import UserError
-from tqdm import tqdm
 
 from phototaxis_lab.cell import Cell, Outcome, System
 from phototaxis_lab.parallel import cluster, outcomes
-from phototaxis_lab.results import Results
+from phototaxis_lab.progress import Progress
+from phototaxis_lab.results import Results, alone_in
 from phototaxis_lab.running import Running
 from phototaxis_lab.statistics import mean_interval, median_interval
-
-QUIET = 30.0
-"""Seconds between two lines of progress."""
 
 
 def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
     """The outcomes of all cells; those that the folder holds already are not computed again."""
-    results = Results(folder, cells)
-    missing = results.missing
-    if found := len(cells) - len(missing):
-        print(f"{folder}: {found} of {len(cells)} are done already", file=sys.stderr)
-    for place, outcome in watched([cells[index] for index in missing], running):
-        results.add(missing[place], outcome)
+    with alone_in(folder):
+        results = Results(folder, cells)
+        missing = results.missing
+        if found := len(cells) - len(missing):
+            print(f"{folder}: {found} of {len(cells)} are done already", file=sys.stderr)
+        for place, outcome in watched([cells[index] for index in missing], running):
+            results.add(missing[place], outcome)
     return results
 
 
 def watched(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int, Outcome]]:
-    """`parallel.outcomes`, with a progress bar that counts epochs; a line now and then where there is no terminal."""
+    """`parallel.outcomes`, while the progress in epochs is shown."""
     if running.backend == "dask" and not running.scheduler:
         raise UserError("--backend dask needs the address of a scheduler: --scheduler tcp://HOST:8786")
     if running.jobs == 0:
         raise UserError("--jobs 0: at least one process is needed, or -1 for one on each core")
-    total, done, spoke = sum(cell.epochs for cell in cells), 0, time.monotonic()
-    bar = tqdm(total=total, unit=" epochs", unit_scale=True, disable=not (cells and sys.stderr.isatty()))
-    with cluster(running.backend, running.scheduler), bar:
+    if cells:
+        print(f"agents that learn and are measured: {len(cells)}", file=sys.stderr, flush=True)
+    progress = Progress(sum(cell.epochs for cell in cells), "epochs")
+    with cluster(running.backend, running.scheduler), progress:
         for index, outcome in outcomes(cells, running.jobs):
             yield index, outcome
-            bar.update(cells[index].epochs)
-            done += cells[index].epochs
-            if bar.disable and time.monotonic() > spoke + QUIET:
-                spoke = time.monotonic()
-                print(f"{done:,} of {total:,} epochs", file=sys.stderr, flush=True)
+            progress.add(cells[index].epochs)
 
 
 def by_system(results: Results) -> dict[tuple[System, int], list[Outcome]]:

@@ -9,6 +9,8 @@ from phototaxis_agent.setup import Setup
 from phototaxis_sensors.suite import Make, SensorSuite, built_in
 from phototaxis_sim.simulation import Simulation
 
+from phototaxis_lab.progress import Progress
+
 
 class Loop:
     """One run, tick by tick, bit-identical to the same run over the bus."""
@@ -33,7 +35,9 @@ def train(setup: Setup, arena: Arena, seed: int, epochs: int, make: Make = built
     """Learn for `epochs` steps; the loop as it ended, and the seconds it took."""
     loop = Loop(arena, setup.agent(World("lab", arena, seed, epochs)), seed, epochs, make=make)
     began = time.perf_counter()
-    while not loop.simulation.finished:
-        loop.step()
+    with Progress(epochs, "epochs") as progress:
+        while not loop.simulation.finished:
+            if loop.step() is None:
+                progress.add()
     loop.finish()
     return loop, time.perf_counter() - began

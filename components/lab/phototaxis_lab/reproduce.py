@@ -32,15 +32,15 @@ def main(argv: Sequence[str]) -> int:
     try_folder(out, "--out")
     try_folder(Path(options.results), "--results")
     found = {}
-    for part, planned in plan.PARTS.items():
+    for number, (part, planned) in enumerate(plan.PARTS.items(), start=1):
         began, cells = time.monotonic(), plan.cells(planned, seeds)
-        print(f"{part}: {len(cells)} agents learn and are measured", file=sys.stderr)
+        print(f"{part}, {number} of {len(plan.PARTS)} parts", file=sys.stderr)
         found |= by_system(compute(cells, Path(options.results) / part, options))
         print(f"{part}: {(time.monotonic() - began) / 60:.1f} minutes", file=sys.stderr)
     data = {
         name: {epochs: found[system, epochs] for epochs in budgets} for name, (system, budgets) in plan.WHOLE.items()
     }
-    print("writing the page", file=sys.stderr)
+    print("writing the page and its figures", file=sys.stderr)
     page.write(out, data, seeds)
     print(out / "README.md")
     return 0

@@ -1,6 +1,11 @@
 """A folder of results that a killed experiment continues."""
 
-from collections.abc import Sequence
+import fcntl
+import json
+import os
+from codecs import BOM_UTF8
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +13,7 @@ import msgspec
 from msgspec import Struct
 from phototaxis.disk import append_whole, try_folder, unwritten, write_whole
 from phototaxis.errors import Unavailable, UserError, warn
+from phototaxis.words import plain
 from phototaxis_sim import arenas
 
 from phototaxis_lab.cell import Cell, Outcome, System
@@ -21,7 +27,10 @@ class Row(Struct):
 
 
 class Results:
-    """`grid.json`, the cells and all that decides their outcomes, and `results.jsonl`, one line for each that is done.
+    """`grid.json`, the systems with all that decides their outcomes, and `results.jsonl`, one line for each cell done.
+
+    A folder may be asked for more seeds, epochs or systems than it holds: they are added. What it holds beside the
+    cells that are asked for stays there.
 
     Parameters
     ----------
@@ -31,42 +40,57 @@ class Results:
     Raises
     ------
     UserError
-        when the folder holds the results of other cells, or cannot be written.
+        when a system of the same name meant something else when the folder was begun, or the folder cannot be
+        written.
 
     Outcomes that find no room on the disk are kept in memory and are written as soon as there is some.
     """
 
     def __init__(self, folder: Path, cells: Sequence[Cell]):
         self._path, self.cells = folder / "results.jsonl", list(cells)
-        grid, encoded = folder / "grid.json", _grid(self.cells)
         self._waiting: list[bytes] = []
         try_folder(folder, "--out")
         try:
-            if not grid.exists():
-                write_whole(grid, encoded)
-            elif grid.read_bytes() != encoded:
-                raise UserError(f"{folder}: holds the results of another grid; give another folder, or remove this one")
+            self._extend(folder / "grid.json")
             self.done: dict[int, Outcome] = self._read()
         except OSError as error:
             raise UserError(f"{folder}: {error.strerror}") from None
+
+    def _extend(self, file: Path) -> None:
+        """Add the systems that the grid does not have; those that it has must still be what they were."""
+        ours = _systems(self.cells)
+        if self._path.exists() and not file.exists():
+            raise UserError(f"{file}: missing, so nobody knows what the results mean; give another folder")
+        try:
+            known = json.loads(file.read_text("utf-8-sig"))["systems"] if file.exists() else {}
+            changed = next((name for name in ours if known.get(name, ours[name]) != ours[name]), None)
+        except (ValueError, LookupError, TypeError, AttributeError):
+            raise UserError(f"{file}: damaged; remove it, or give another folder") from None
+        if changed is not None:
+            raise UserError(
+                f"{file.parent}: holds results of '{changed}' in another arena or with other options of the same name; "
+                "give another folder, or remove this one"
+            )
+        if ours.keys() - known.keys():
+            write_whole(file, json.dumps({"systems": known | ours}, indent=1).encode())
 
     def _read(self) -> dict[int, Outcome]:
         """What is done, by the index of the cell; a line that a kill left unfinished is dropped."""
         if not self._path.exists():
             return {}
-        *whole, rest = self._path.read_bytes().split(b"\n")
+        *whole, rest = self._path.read_bytes().removeprefix(BOM_UTF8).split(b"\n")
         if rest:
             with self._path.open("r+b") as file:
                 file.truncate(self._path.stat().st_size - len(rest))
         known = {_key(cell): index for index, cell in enumerate(self.cells)}
         rows = [self._row(number, line) for number, line in enumerate(whole, start=1)]
-        return {known[_key(row.cell)]: row.outcome for row in rows}
+        return {known[key]: row.outcome for row in rows if (key := _key(row.cell)) in known}
 
     def _row(self, number: int, line: bytes) -> Row:
         try:
             return msgspec.json.decode(line, type=Row)
         except msgspec.MsgspecError as error:
-            raise UserError(f"{self._path}, line {number}: {error}; mend it or remove it") from None
+            raise UserError(f"{self._path}, line {number}: {plain(str(error))}; mend it or remove it") from None
 
     @property
     def missing(self) -> list[int]:
@@ -100,14 +124,38 @@ class Results:
             self._waiting.pop(0)
 
 
-def _grid(cells: Sequence[Cell]) -> bytes:
-    """The cells, each system spelt out: its presets and its arena may have changed since a folder was begun."""
+def _systems(cells: Sequence[Cell]) -> dict[str, Any]:
+    """Each system spelt out: its presets and its arena may have changed since a folder was begun."""
     systems = {
         str(system): {"as": System.of(system.setup(), system.arena), "arena": arenas.load(system.arena)}
         for system in dict.fromkeys(cell.system for cell in cells)
     }
-    grid = {"systems": systems, "cells": [[str(cell.system), cell.epochs, cell.seed] for cell in cells]}
-    return msgspec.json.format(msgspec.json.encode(grid), indent=1)
+    return json.loads(msgspec.json.encode(systems))
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Keep a folder, which is made where it is missing, to ourselves.
+
+    Raises
+    ------
+    Unavailable
+        when another process computes there.
+    UserError
+        when the folder cannot be used.
+    """
+    with ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = os.open(folder, os.O_RDONLY)
+            stack.callback(os.close, lock)
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            line = f"{folder}: another experiment computes there; wait until it ends, or give another folder with --out"
+            raise Unavailable(line) from None
+        except OSError as error:
+            raise UserError(f"{folder}: {error.strerror}") from None
+        yield
 
 
 def _key(cell: Cell) -> Any:

@@ -5,7 +5,9 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 from phototaxis.errors import UserError
 
-SEEDS = Annotated[str, Meta(pattern=r"^[0-9]+:[0-9]+$")]
+SEEDS = Annotated[
+    str, Meta(pattern=r"^[0-9]+:[0-9]+$", description="A:B, the seeds from A to B − 1", examples=["0:20"])
+]
 
 
 class Running(Struct, kw_only=True):

@@ -12,7 +12,7 @@ from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Seed
 
-from phototaxis_lab.running import Running, seed_range
+from phototaxis_lab.running import SEEDS, Running, seed_range
 
 
 class Options(Running, kw_only=True):
@@ -22,7 +22,7 @@ class Options(Running, kw_only=True):
     """name of a shipped arena, or a TOML file"""
     seed: Seed = 0
     """decides everything: placements, noise, the learner and its exploration"""
-    seeds: Annotated[str, Meta(pattern=r"^([0-9]+:[0-9]+)?$")] = ""
+    seeds: SEEDS = ""
     """A:B: learn with each seed from A to B − 1 and evaluate each on 200 fresh placements"""
     epochs: Annotated[int, Meta(ge=1)] = 3000
     """learning steps"""
@@ -36,7 +36,7 @@ def main(argv: Sequence[str]) -> int:
     from phototaxis_agent.setup import parse_setup
 
     about = "Learn in one process, without a bus; the same seeds give the same hashes as `phototaxis up`."
-    options, setup, fmus = parse_setup(Options, argv, "phototaxis train", about, **{"sensor models": FmuOptions})
+    options, setup, fmus = parse_setup(Options, argv, "phototaxis train", about, {"sensor models": FmuOptions})
     if options.checkpoint and options.seeds:
         raise UserError("--checkpoint keeps one learner, --seeds makes many; give one of the two")
     if options.checkpoint:

@@ -27,9 +27,9 @@ class Options(Struct, kw_only=True):
     """folder to make; it must not exist"""
     worlds: WorldNames = "phototaxis"
     """names of the worlds, separated by commas"""
-    host: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.:-]+$")] = "localhost"
+    host: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.:-]+$", description="a host's name or address")] = "localhost"
     """name or IPv4 address under which the clients reach the router"""
-    listen: Annotated[str, Meta(pattern=r"^[0-9a-fA-F.:]+$")] = "127.0.0.1"
+    listen: Annotated[str, Meta(pattern=r"^[0-9a-fA-F.:]+$", description="an address in numbers")] = "127.0.0.1"
     """address that the router listens on; 0.0.0.0: all of its machine's"""
     port: Annotated[int, Meta(ge=1, le=65535)] = 7447
     """port of the router"""

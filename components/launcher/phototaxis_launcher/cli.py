@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from phototaxis import __version__
 from phototaxis.errors import UserError, leave, one_line
-from phototaxis.stderr import may_be_lost
 
 
 class Verb(NamedTuple):
@@ -50,7 +49,6 @@ VERBS = {
 
 def main() -> None:
     """Entry point of the `phototaxis` command."""
-    may_be_lost()
     leave(one_line(lambda: dispatch(sys.argv[1:])))
 
 

@@ -2,10 +2,13 @@
 
 import json
 import re
+import shutil
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -72,6 +75,7 @@ class Run:
         swaps = swap_plan(options.swap)
         self.folder = run_folder(Path(options.out))
         self.name = self.folder.name
+        self._begun = False
         self._lost: UserError | None = None
         """How the recorder ended before the run did."""
         self.checkpoint = self._checkpoint("agent")
@@ -93,7 +97,7 @@ class Run:
             "agent": self._agent(agent_words),
         }  # fmt: skip
         for tick, learner in swaps:
-            self._agent(self._successor(["--learner", learner]), "--take-over", f"--at={tick}")
+            self._agent(successor(agent_words, ["--learner", learner]), "--take-over", f"--at={tick}")
         if not options.no_recorder:
             wanted = {"--grpc-port": options.grpc_port, "--web-port": options.web_port}
             grpc, web = find_ports("127.0.0.1", wanted)
@@ -117,13 +121,6 @@ class Run:
     def _checkpoint(self, name: str) -> Path:
         return self.folder / f"{name.replace('agent', 'checkpoint')}.npz"
 
-    def _successor(self, words: list[str]) -> list[str]:
-        """Words for a new agent: what the first one was given comes first, as far as it is not another learner's."""
-        if _learner(words) == _learner(self._words):
-            return [*self._words, *words]
-        percept = peek(self._words, "--percept", "")
-        return [*([f"--percept={percept}"] if percept else []), *words]
-
     def go(self, progress: Progress) -> Status:
         """Start, watch until finished or stopped, end; the last status.
 
@@ -131,6 +128,7 @@ class Run:
         """
         status = Status(self.name, "waiting")
         with (
+            self._folder_of_a_run(),
             open_session("launcher", self._options) as session,
             Bus(session, self._options.name, "launcher", f"up-{self.name}") as bus,
         ):
@@ -152,6 +150,7 @@ class Run:
                         self._launch(event, progress)
                     if event is not None and event.topic == "status":
                         status = event.message
+                        self._begun = self._begun or status.tick > 0
                         progress.show(status)
                         self._report(status, progress)
                         self._complain(status, progress)
@@ -163,6 +162,24 @@ class Run:
                 progress.close()
                 self.stop()
         return status
+
+    @contextmanager
+    def _folder_of_a_run(self) -> Iterator[None]:
+        """Make the run's folder; a run that the user's input or a missing peer kept from beginning leaves none."""
+        made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
+        try:
+            self.folder.mkdir(parents=True)
+        except OSError as error:
+            raise UserError(f"--out {self._options.out}: {error.strerror}") from None
+        try:
+            yield
+        except UserError as error:
+            if not self._begun and not isinstance(error, ComponentFailed):
+                shutil.rmtree(self.folder, ignore_errors=True)
+                with suppress(OSError):  # somebody else's files are in it by now
+                    for path in made[1:]:
+                        path.rmdir()
+            raise
 
     def _complete(self, status: Status) -> bool:
         """Finished, and all are there to take part in the ending (one may just have been restarted)."""
@@ -194,7 +211,7 @@ class Run:
         request: Launch | None = event.message
         if request is None or event.reply is None:
             return
-        child = self._agent(self._successor(request.words), "--take-over")
+        child = self._agent(successor(self._words, request.words), "--take-over")
         child.start()
         self._pending.append((child, event))
         progress.say(f"asked to swap: {child.name} is started")
@@ -316,6 +333,14 @@ class Run:
             raise fault
 
 
+def successor(first: list[str], words: list[str]) -> list[str]:
+    """Words for a new agent: what the first one was given comes first, as far as it is not another learner's."""
+    if _learner(words) == _learner(first):
+        return [*first, *words]
+    percept = peek(first, "--percept", "")
+    return [*([f"--percept={percept}"] if percept else []), *words]
+
+
 def swap_plan(text: str) -> list[tuple[int, str]]:
     """The ticks and learners of TICK:LEARNER,…; UserError when it is something else."""
     found = [SWAPS.fullmatch(part) for part in text.split(",")] if text else []
@@ -342,6 +367,8 @@ def parse(argv: Sequence[str], prog: str = "phototaxis up") -> tuple[UpOptions, 
     options = convert(UpOptions, vars(own))
     if options.listen:
         raise UserError(f"--listen is for single components; {prog} links its own, or uses a router with --connect")
+    for learner in {_learner(words), *(learner for _, learner in swap_plan(options.swap))}:
+        import_module("phototaxis_agent.__main__").read(successor(words, ["--learner", learner]), parser.option_strings)
     return options, convert(FmuOptions, vars(own)), words
 
 

@@ -29,7 +29,9 @@ class Options(ComponentOptions, kw_only=True):
     """port of the live Rerun server; 0: any free one"""
     web_port: Annotated[int, Meta(ge=-1, le=65535)] = 9090
     """port of the web viewer's page; 0: any free one; -1: none"""
-    memory: Annotated[str, Meta(pattern=r"^[0-9]+(MB|GB|MiB|GiB)$")] = "256MiB"
+    memory: Annotated[str, Meta(pattern=r"^[0-9]+(MB|GB|MiB|GiB)$", description="a size in MB, GB, MiB or GiB")] = (
+        "256MiB"
+    )
     """memory for viewers that come late, such as 256MiB"""
 
 
@@ -53,6 +55,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     def start(world: World) -> Recording:
         file = output / f"{world.run}.rrd" if output.is_dir() else output
+        print(f"recorder: records the run {world.run} into {file}", file=sys.stderr, flush=True)
         return Recording(world, file, options.bind, grpc_port, options.memory)
 
     page = Page(options.bind, web_port, grpc_port) if web_port >= 0 else None

@@ -1,5 +1,6 @@
 """The sensors on the bus: answer each state with its readings."""
 
+import sys
 import time
 from itertools import chain
 from typing import Any, NamedTuple
@@ -81,6 +82,7 @@ class Server:
             self._log.flush()
             self._newest = -1
             self._many = world, Once(SuiteOfMany(world, self._make))
+            self._say(f"senses for {world.robots} robots in the run {state.run}")
         try:
             readings = self._many[1](state)
         except Refused as why:
@@ -109,7 +111,11 @@ class Server:
         if any(model.remembers for model in suite.models):
             self._recall(suite, state)
         self._session = Session(state.run, suite, Once(suite))
+        self._say(f"senses in the run {state.run}")
         return self._session
+
+    def _say(self, text: str) -> None:
+        print(f"{self._bus.ident}: {text}", file=sys.stderr, flush=True)
 
     def _recall(self, suite: SensorSuite, now: State) -> None:
         """Lead the models through the earlier ticks of the episode, which the simulation's log has."""

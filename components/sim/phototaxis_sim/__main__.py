@@ -12,6 +12,7 @@ from phototaxis.errors import UserError
 from phototaxis.journal import Journal
 from phototaxis.messages import MOST, Count, Seed, run_name
 from phototaxis.options import parse
+from phototaxis.words import WORD
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -25,7 +26,7 @@ class Options(ComponentOptions, kw_only=True):
     """learning steps after which the run is finished; 0: run until stopped"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """simulated seconds per second; 0: lockstep, as fast as the answers come"""
-    run: Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$")] = ""
+    run: Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["run-1"])] = ""
     """name of the run (default: date, time and a few random letters)"""
     patience: Annotated[float, Meta(gt=0)] = 5.0
     """seconds after which a driver that is there but silent loses the seat, if somebody else waits for it"""

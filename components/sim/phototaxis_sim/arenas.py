@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError, warn
+from phototaxis.words import known, plain
 
 from phototaxis_sim.survey import survey
 
@@ -35,7 +36,7 @@ def load(name: str) -> Arena:
     path = Path(name)
     try:
         if not path.is_file():
-            raise UserError(f"no arena '{name}': neither a file nor one of {', '.join(shipped())}")
+            raise UserError(f"no arena '{name}': neither a file nor one that is shipped; {known(name, shipped())}")
         if path.stat().st_size > _LIMIT:
             raise UserError(f"{name}: larger than {_LIMIT} bytes, not an arena")
         return parse(path.read_text("utf-8-sig"), name)
@@ -80,12 +81,6 @@ def parse(text: str, source: str) -> Arena:
         raise UserError(f"{source}: {_explain(str(error), raw)}") from None
 
 
-_PLAIN = {
-    "`float`": "a number", "`int`": "a whole number", "`str`": "a text", "`array`": "a list", "`object`": "a table",
-    "`bool`": "true or false",
-}  # fmt: skip
-
-
 def _explain(text: str, raw: Any) -> str:
     """msgspec's words with the key in front: `robot.wheels: unknown key`."""
     what, _, where = text.partition(" - at `$")
@@ -98,11 +93,10 @@ def _explain(text: str, raw: Any) -> str:
     if missing:
         return f"{'.'.join(filter(None, [where, missing[1]]))}: missing"
     if not where:
-        return what
-    for word, plain in _PLAIN.items():
-        what = what.replace(word, plain)
+        return plain(what)
     value = _at(raw, where)
     got = f", got {value!r}" if type(value) in (int, float) else ""
+    what = plain(what)
     return f"{where}: {what[0].lower()}{what[1:]}{got}"
 
 

@@ -153,7 +153,7 @@ class Server:
             self._heard_of, self._heard_at = self._seat.driver, now
         elif self._seat.driver and self._seat.next(tick) and now - self._heard_at > self._patience:
             line = f"{self._seat.driver} has been silent for {self._patience:g} s and loses the seat at tick {tick}"
-            print(f"sim: {line}", file=sys.stderr, flush=True)
+            self._say(line)
             self._seat.vacate(tick)
             self._ask()
 
@@ -173,6 +173,7 @@ class Server:
         now = self._heard_at = time.monotonic()
         if self._started is None:
             self._started = now, state.tick
+            self._say(f"{command.author} drives in the run {state.run}, from tick {state.tick} on")
         self._pace.commanded(now)
         if not self._pace.realtime:
             self._answered()
@@ -188,6 +189,7 @@ class Server:
             self._log.flush()
             self._announce(time.monotonic())  # the last mean rate
             self._finished = True
+            self._say(f"the run {self._sim.state.run} is finished, at tick {self._sim.state.tick}")
             self._announce(time.monotonic())
         elif not self._paused or self._steps_due:
             self._steps_due = max(self._steps_due - 1, 0)
@@ -279,6 +281,9 @@ class Server:
         """Which part cannot keep up with the speed, in words."""
         sensors = next((who.split("/")[1] for who in sorted(self._alive) if who.startswith("sensors/")), "the sensors")
         return self._lateness.told(self._seat.driver or "the agent", sensors) if self._pace.realtime else ""
+
+    def _say(self, text: str) -> None:
+        print(f"sim: {text}", file=sys.stderr, flush=True)
 
     def _begin(self, seed: int) -> None:
         """A new run in the same arena; its name says from which it comes, for the journal."""
