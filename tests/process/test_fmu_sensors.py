@@ -10,7 +10,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from fmus import FAULTS, Built, described, edited, workers
+from fmus import FAULTS, Built, altered, described, edited, workers
 from phototaxis_sensors.fmu.build import build
 from phototaxis_sensors.fmu.examples import EXAMPLES
 from rerun_files import series
@@ -245,19 +245,24 @@ def test_the_built_in_model_takes_over_only_if_asked(fmu: Built, up):
     assert phototaxis("evaluate", asked["checkpoint"], "--placements", 20, *faulty).returncode == 4
 
 
-def test_nobody_outlives_killed_sensors(fmu: Built, start, world):
-    """Not even an FMU in an endless loop."""
+def test_nobody_outlives_killed_sensors(start, world, tmp_path):
+    """Not even an FMU in an endless loop, nor a helper that it has started."""
+    helper = 'if (!fork()) execlp("sleep", "sleep", "100000", NULL); if (m) begin(m);'
+    code = {"if (m) begin(m);": helper, '#include "fmi2Functions.h"': '#include <unistd.h>\n#include "fmi2Functions.h"'}
+    file = altered(tmp_path / "helped.fmu", "faulty", 2, code)
     place = ["--name", world]
     sim = start("sim", *place)
     words = "--fmu-param", "fault=6", "--fmu-param", "at=5", "--fmu-timeout", 600
-    sensors = start("sensors", *place, "--light-fmu", fmu("faulty", 2), *words)
+    sensors = start("sensors", *place, "--light-fmu", file, *words)
     agent = start("agent", *place)
     with observer(world) as bus:
         status = wait_status(bus, lambda status: status.phase == "waiting" and status.tick > 2, sim, sensors, agent)
     assert status.tick <= 6
-    worker = psutil.Process(sensors.popen.pid).children()[0]
+    left = psutil.Process(sensors.popen.pid).children(recursive=True)
+    assert len(left) == 4, "the worker, its guard, and a helper of each of two instances"
     sensors.kill()
-    worker.wait(20)
+    gone, alive = psutil.wait_procs(left, 20)
+    assert len(gone) == 4, alive
 
 
 def test_training_and_evaluation_take_fmus_too(fmu: Built, tmp_path):

@@ -14,7 +14,7 @@ from phototaxis.arena import Arena
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
-from phototaxis_sensors.fmu.build import build
+from phototaxis_sensors.fmu.build import Version, build
 from phototaxis_sensors.fmu.description import read
 from phototaxis_sensors.fmu.examples import EXAMPLES
 from phototaxis_sensors.fmu.host import Host
@@ -336,7 +336,7 @@ def test_the_helpers_of_an_fmu_end_with_it(paper: Arena, sensors, tmp_path: Path
 # -- sources with a prefix
 
 
-def prefixed(version: int, target: Path) -> Path:
+def prefixed(version: Version, target: Path) -> Path:
     """The sources of an FMU whose functions are called lag_fmi3DoStep, unless the standard's macro says otherwise."""
     source = target.with_suffix(".plain")
     build(EXAMPLES["lag"], version, source, sources_only=True)

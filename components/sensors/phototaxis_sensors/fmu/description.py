@@ -54,9 +54,9 @@ class Fmu(NamedTuple):
         """The variable of that name."""
         return next((one for one in self.description.modelVariables if one.name == name), None)
 
-    def listed(self, causality: str) -> str:
-        """The first variables of a causality, for a message."""
-        names = [one.name for one in self.description.modelVariables if one.causality == causality]
+    def listed(self, *causalities: str) -> str:
+        """The first variables of some causalities, for a message."""
+        names = [one.name for one in self.description.modelVariables if one.causality in causalities]
         return ", ".join([*names[:8], *(["…"] if len(names) > 8 else [])]) or "none"
 
 
@@ -148,7 +148,11 @@ def _describe(path: str, allow_invalid: bool) -> ModelDescription:
 
 def require_library(fmu: Fmu, allow_compile: bool) -> None:
     """Raise UserError unless this machine can run it, after compiling it where that is allowed."""
-    if fmu.compiled or (fmu.sources and allow_compile):
+    if fmu.compiled:
+        return
+    if fmu.sources and allow_compile:
+        if not fmu.description.buildConfigurations:
+            raise UserError(f"{fmu.file}: has C sources, but does not say which of them to compile")
         return
     if fmu.sources and not fmu.platforms:
         raise UserError(f"{fmu.file}: has C sources alone; add --allow-compile to build it here")

@@ -6,7 +6,6 @@ import signal
 import struct
 import subprocess
 import sys
-import time
 import zipfile
 from collections.abc import Sequence
 from contextlib import suppress
@@ -27,8 +26,9 @@ LOADING = 30.0
 """Seconds that an FMU may take to be loaded."""
 LOOK = 0.1
 """Seconds after which a silent worker is looked at: a helper of the FMU may hold its pipes when it is dead."""
-GUARD = 'read -r _; kill -9 -- "-$1"; rm -rf -- "$2"'
-"""A shell that waits until its parent is gone, however it went: then it ends a process group and removes a folder."""
+GUARD = 'read -r _; rm -rf -- "$2"; kill -s KILL -- "-$1"; rm -rf -- "$2"'
+"""A shell that waits until its parent is gone, however it went: then it removes a folder and ends a
+process group, which may have used the folder until then."""
 
 
 def stay_on_one_cpu() -> None:
@@ -217,13 +217,13 @@ class Host:
             self._read(HEAD.size, self._terms.timeout)  # its last words, or the way it died
 
     def _read(self, size: int, timeout: float) -> bytes:
-        answer, deadline = b"", time.monotonic() + timeout
+        answer, left = b"", timeout
         while True:
-            left = deadline - time.monotonic()
-            if not self._poll.poll(max(min(left, LOOK), 0.0) * 1000):
+            if not self._poll.poll(min(left, LOOK) * 1000):
                 if not self._alive():
                     raise Failed(self._died())
-                if left <= LOOK:
+                left -= LOOK
+                if left <= 0:
                     raise Failed(self._end(f"gave no answer within {timeout:g} s and was ended"))
                 continue
             got = os.read(self._from, 65536)

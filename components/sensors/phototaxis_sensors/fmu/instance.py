@@ -12,7 +12,7 @@ import msgspec
 from phototaxis_sensors.fmu.log import MARK, one_line
 
 STATUS = ("OK", "a warning", "discard", "an error", "a fatal error", "pending")
-FATAL = 4
+WARNING, FATAL = 1, 4
 TOLD = 2 * 1000
 """Most messages of the FMU's logger that are passed on; no more would be shown."""
 
@@ -87,13 +87,13 @@ class Voice:
 
 
 class Part(NamedTuple):
-    """A run of inputs or outputs of one type: an argument list of the FMU's functions, and where the doubles are."""
+    """A run of inputs or outputs of one type, and the call that sets or gets them."""
 
-    call: Callable[..., Any]
-    references: Any
-    number: int
+    name: str
+    call: Callable[..., int]
+    arguments: tuple[Any, ...]
+    """After the instance: value references, their number, values, and for FMI 3 the number of values."""
     values: Any
-    more: tuple[int, ...]
     doubles: Any
     """None where `values` are the doubles themselves."""
 
@@ -157,10 +157,11 @@ class Instance:
             if found is not None and (found[1] or found[2]):
                 raise Broken(f"{'terminated' if found[1] else 'returned early'} at {self._time:g} s")
             self._time += step
-        for part in self._outputs:
-            part.call(fmu.component, part.references, part.number, part.values, *part.more)
-            if part.doubles is not None:
-                part.doubles[:] = part.values[:]
+        for name, call, arguments, values, doubles in self._outputs:
+            if (status := call(fmu.component, *arguments)) > WARNING:
+                raise self._refused(name, status)
+            if doubles is not None:
+                doubles[:] = values[:]
 
     def end(self) -> None:
         """Terminate and free it."""
@@ -191,15 +192,22 @@ class Instance:
             getattr(self._fmu, f"set{kind}")([one.reference], one.values)
 
     def _feed(self) -> None:
-        for part in self._inputs:
-            if part.doubles is not None:
-                part.values[:] = part.doubles[:]
-            part.call(self._fmu.component, part.references, part.number, part.values, *part.more)
+        for name, call, arguments, values, doubles in self._inputs:
+            if doubles is not None:
+                values[:] = doubles[:]
+            if (status := call(self._fmu.component, *arguments)) > WARNING:
+                raise self._refused(name, status)
 
     def _free(self) -> None:
         """Free the instance and keep the library: to load it again and again leaks, or crashes."""
         component, self._fmu.component = self._fmu.component, None
         getattr(self._fmu, f"fmi{self._setup.version}FreeInstance")(component)
+
+    @staticmethod
+    def _refused(name: str, status: int) -> Exception:
+        from fmpy.fmi1 import FMICallException
+
+        return FMICallException(name, status)
 
     def _parts(self, verb: str, ends: Sequence[Ends], buffer: bytearray, at: int) -> list[Part]:
         found = []
@@ -207,16 +215,13 @@ class Instance:
             doubles = (ctypes.c_double * end.values).from_buffer(buffer, at)
             at += ctypes.sizeof(doubles)
             single = end.kind == "Float32"
-            found.append(
-                Part(
-                    getattr(self._fmu, f"fmi{self._setup.version}{verb}{end.kind}"),
-                    (ctypes.c_uint * len(end.references))(*end.references),
-                    len(end.references),
-                    (ctypes.c_float * end.values)() if single else doubles,
-                    () if self._setup.version == 2 else (end.values,),
-                    doubles if single else None,
-                )
-            )
+            values = (ctypes.c_float * end.values)() if single else doubles
+            references = (ctypes.c_uint * len(end.references))(*end.references)
+            more = () if self._setup.version == 2 else (end.values,)
+            name = f"fmi{self._setup.version}{verb}{end.kind}"
+            call = getattr(self._fmu.dll, name)  # whose types fmpy has declared; its own way to call takes longer
+            arguments = references, len(references), values, *more
+            found.append(Part(name, call, arguments, values, doubles if single else None))
         return found
 
     def _load(self, number: int) -> Any:

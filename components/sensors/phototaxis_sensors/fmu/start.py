@@ -30,7 +30,8 @@ def start_value(fmu: Fmu, name: str, text: str) -> Parameter:
     """
     variable = fmu.variable(name)
     if variable is None or variable.causality not in SETTABLE:
-        raise UserError(f"{fmu.file}: has no parameter '{name}'; its parameters are {fmu.listed('parameter')}")
+        there = fmu.listed("parameter", "structuralParameter")
+        raise UserError(f"{fmu.file}: has no parameter '{name}'; its parameters are {there}")
     said = f"--fmu-param {name}={text}"
     if variable.type in ("Binary", "Clock"):
         raise UserError(f"{said}: {name} is of type {variable.type}, which cannot be set")
