@@ -19,7 +19,7 @@ NotNegative = Annotated[float, Meta(ge=0, le=MOST)]
 
 
 class Wall(Struct, forbid_unknown_fields=True, frozen=True):
-    """A straight wall from `start` to `end`, with flat sides `thickness` apart and round ends."""
+    """A straight wall from `start` to `end`, with flat sides `thickness` apart (2 mm at least) and round ends."""
 
     start: Point
     end: Point
@@ -101,7 +101,8 @@ class Motion(Struct, forbid_unknown_fields=True, frozen=True):
     control_period: Positive = 0.5
     """One tick of the bus and one learning step, s."""
     physics_step: Positive = 0.1
-    """One step of the physics, s; the control period is a whole number of them."""
+    """One step of the physics, s; the control period is a whole number of them. Where the robot would move too far in
+    one to be stopped by what is thin, it is divided (`phototaxis.strides`)."""
     collision: Literal["contact", "stall"] = "contact"
     """contact: the body is stopped and slides along the wall; stall: a step that would touch is refused."""
     friction: Annotated[float, Meta(ge=0, le=2)] = 0.0
@@ -117,13 +118,7 @@ class Placement(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Arena(Struct, forbid_unknown_fields=True, frozen=True):
-    """A world as its TOML file describes it.
-
-    Raises
-    ------
-    ValueError
-        when it breaks a rule (`phototaxis.rules`); a decoder makes a ValidationError of it.
-    """
+    """A world as its TOML file describes it; one that breaks a rule (`phototaxis.rules`) cannot be made."""
 
     name: Annotated[str, Meta(min_length=1, max_length=64)]
     size: tuple[Positive, Positive]

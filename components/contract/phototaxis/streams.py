@@ -31,6 +31,6 @@ def prepare() -> None:
             setattr(sys, name, os.fdopen(number, "w" if number else "r"))
         elif number and isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
-    if isinstance(sys.stderr, io.TextIOWrapper) and not isinstance(sys.stderr.buffer.raw, _Dropping):
+    if isinstance(sys.stderr, io.TextIOWrapper) and sys.stderr is sys.__stderr__:  # not one of a test or a notebook
         file = io.BufferedWriter(_Dropping(sys.stderr.fileno(), "w", closefd=False))
         sys.stderr = io.TextIOWrapper(file, sys.stderr.encoding, "replace", line_buffering=True)

@@ -105,14 +105,14 @@ class Crowd:
 
     def _bring_back(self, touched: np.ndarray, before: np.ndarray, poses: np.ndarray) -> None:
         """Undo the last stride of those whom a contact has pushed too deep or too far, in `poses` too."""
-        step = poses - before
+        rows = np.flatnonzero(touched)
+        step = poses[rows] - before[rows]
         step[:, 2] -= 2 * np.pi * np.round(step[:, 2] / (2 * np.pi))
         moved = np.hypot(step[:, 0], step[:, 1]) + self._radius * np.abs(step[:, 2])
-        astray = touched & ((self._depth > self._deepest) | (moved > self._furthest))
-        for row in np.flatnonzero(astray).tolist():
+        for row in rows[(self._depth[rows] > self._deepest) | (moved > self._furthest)].tolist():
             x, y, angle = before[row].tolist()
             undo(self._bodies[row], (x, y), angle, self._dt)
-        poses[astray], self._depth[astray] = before[astray], 0.0
+            poses[row], self._depth[row] = before[row], 0.0
 
     def _set(self, fields: BodyFields, rows: np.ndarray) -> None:
         self._told.set_float_buf(rows)
@@ -136,10 +136,12 @@ class Crowd:
         rows = self._order[found]
         mine = self._ids[rows] == ids[:, :2]
         row = np.where(mine[:, 0], rows[:, 0], rows[:, 1])
-        there = np.arange(2) < ids[:, 2:]
-        points = floats[:, 2:].reshape(-1, 2, 3)  # x, y, distance
+        points, there = floats[:, 2:].reshape(-1, 2, 3), np.arange(2) < ids[:, 2:]  # x, y, distance
         np.maximum.at(self._depth, row, np.where(there, np.maximum(-points[:, :, 2], 0.0), -1.0).max(axis=1))
-        there &= (np.abs(floats[:, :2]).max(axis=1) > 0)[:, None]  # beside a wall, or leaving it: nothing presses
+        pressed = (floats[:, 0] != 0) | (floats[:, 1] != 0)  # else beside a wall, or leaving it
+        if not pressed.any():
+            return
+        row, points, there = row[pressed], points[pressed], there[pressed]
         x, y, heading = poses[row].T[:, :, None]
         ahead = (points[:, :, 0] - x) * np.cos(heading) + (points[:, :, 1] - y) * np.sin(heading) >= 0
         np.logical_or.at(self.front, row, (ahead & there).any(axis=1))

@@ -247,7 +247,8 @@ class Physics:
 
     def _touched(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         points = arbiter.contact_point_set.points
-        self._depth = max(self._depth, 0.0, *(-point.distance for point in points))
+        for point in points:
+            self._depth = max(self._depth, -point.distance, 0.0)
         if not arbiter.total_impulse:  # beside a wall, or leaving it: nothing presses
             return
         for point in points:
