@@ -44,7 +44,10 @@ def test_what_a_file_leaves_out_lets_no_stranger_in(namespace, tmp_path):
         },
     }
     opened = {
-        "asks-for-multicast": {"listen": {"endpoints": [f"tcp/{address}:0"]}, "scouting": {"multicast": {"enabled": True}}},
+        "asks-for-multicast": {
+            "listen": {"endpoints": [f"tcp/{address}:0"]},
+            "scouting": {"multicast": {"enabled": True}},
+        },
         "asks-for-gossip": {"connect": connect, "scouting": {"gossip": {"enabled": True}}},
     }
     gossip = {"multicast": {"enabled": False}, "gossip": {"enabled": True}}

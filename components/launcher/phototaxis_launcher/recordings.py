@@ -42,7 +42,7 @@ def main(argv: Sequence[str]) -> int:
     doomed = excess(found, time.time(), options.max_age, options.max_size)
     for recording in doomed:
         if not options.dry_run:
-            recording.file.unlink()
+            recording.file.unlink(missing_ok=True)  # somebody else may tidy up too
             summary_file(recording.file).unlink(missing_ok=True)
         print(f"{'would remove' if options.dry_run else 'removed'} {recording.file}", file=sys.stderr)
     rest = found if options.dry_run else [recording for recording in found if recording not in doomed]
