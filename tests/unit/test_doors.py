@@ -1,8 +1,10 @@
 """What a Zenoh configuration leaves out opens no door, and what it opens needs a guard."""
 
 import json
+from pathlib import Path
 
 import pytest
+import yaml
 import zenoh
 from phototaxis import doors
 from phototaxis.errors import UserError
@@ -145,3 +147,11 @@ def test_every_section_of_zenoh_has_been_looked_at():
 def test_who_watches_is_no_stranger_either(address):
     with pytest.raises(UserError, match=f"--bind {address}: others could watch"):
         recorder.main([f"--bind={address}", "--output=/nowhere/at/all.rrd"])
+
+
+def test_the_compose_file_opens_ports_of_this_machine_alone():
+    services = yaml.safe_load((Path(__file__).parents[2] / "deploy/compose.yaml").read_text())["services"]
+    shut = {"--no-multicast-scouting", "--cfg=scouting/gossip/enabled:false", "--adminspace-permissions=none"}
+    assert shut < set(services["router"]["command"])
+    for service in services.values():
+        assert all(port.startswith("127.0.0.1:") for port in service.get("ports", []))

@@ -1,5 +1,6 @@
 """What starts at the same moment gets files of its own."""
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
@@ -10,7 +11,7 @@ from phototaxis import checkpoint
 from phototaxis.component import made_up
 from phototaxis.errors import UserError
 from phototaxis.messages import World
-from phototaxis_launcher import folder
+from phototaxis_launcher import folder, recordings
 from phototaxis_recorder.sinks import fresh_file
 
 MANY = 8
@@ -67,3 +68,14 @@ def test_a_checkpoint_that_many_write_is_one_of_theirs(tmp_path, setup, paper):
 def test_names_on_the_bus_differ():
     assert len({made_up("agent") for _ in range(500)}) == 500
     assert len(made_up("a-learner-with-a-long-name")) == 24
+
+
+def test_what_somebody_else_has_removed_is_removed(tmp_path, monkeypatch):
+    file = tmp_path / "old.rrd"
+    file.write_bytes(b"RRF")
+    os.utime(file, (0, 0))
+    found = recordings.recordings(tmp_path)
+    monkeypatch.setattr(recordings, "recordings", lambda _: found)
+    for _ in range(2):
+        assert recordings.main([f"--out={tmp_path}", "--max-age=1"]) == 0
+    assert not file.exists()

@@ -191,7 +191,8 @@ def _open_local(role: str, name: str, ident: str) -> zenoh.Session:
                 raise Unavailable(f"the bus cannot be opened: {_first_line(error)}") from None
     if role == "agent":
         raise Unavailable(f"an agent '{ident}' is already running in the world '{name}'; choose another --ident")
-    raise Unavailable(f"a {role} is already running in the world '{name}'; end it or choose another --name")
+    who = "phototaxis up" if role == "launcher" else f"a {role}"
+    raise Unavailable(f"{who} is already running in the world '{name}'; end it or choose another --name")
 
 
 def _open(config: zenoh.Config, wait: float) -> zenoh.Session:
