@@ -124,7 +124,9 @@ class CheckedLearner(Learner):
 
     def prove(self, arrays: dict[str, np.ndarray]) -> None:
         """Try whether a fresh learner of this kind can take over what this one has saved."""
-        fresh = CheckedLearner(self.name, self._kind, self._options, self._percept, np.random.default_rng(), self._where)
+        fresh = CheckedLearner(
+            self.name, self._kind, self._options, self._percept, np.random.default_rng(), self._where
+        )
         self._give_back(fresh, arrays)
 
     def _give_back(self, learner: "CheckedLearner", arrays: dict[str, np.ndarray]) -> None:

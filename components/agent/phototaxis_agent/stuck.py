@@ -15,7 +15,7 @@ WITHIN = 10.0
 
 @contextmanager
 def watched(within: float = WITHIN) -> Iterator[None]:
-    """While this lasts, a learner's method that this thread has been in for `within` seconds is told on stderr, once."""
+    """While this lasts, say on stderr, once, in which method of a learner this thread has been for `within` seconds."""
     over = threading.Event()
     thread = threading.Thread(target=_watch, args=(threading.get_ident(), over, within), daemon=True)
     thread.start()
