@@ -336,10 +336,8 @@ def main(argv: Sequence[str]) -> int:
         summarise(result)
     if status.late and status.late == status.tick:
         part = "sensors" if 2 * status.late_sensors > status.late else "agent"
-        line = (
-            f"none of {status.late} ticks had a command in time: the {part} cannot keep up with {status.speed:g} × real"
-        )
-        raise ComponentFailed(f"{line} time, and the robot never moved; lower --speed (0: as fast as it goes)")
+        line = f"none of {status.late} ticks had a command in time, and the robot never moved"
+        raise ComponentFailed(f"{line}: the {part} cannot keep up; lower --speed (0: as fast as it goes)")
     return 0
 
 
