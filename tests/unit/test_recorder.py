@@ -105,3 +105,13 @@ def test_a_pose_that_nobody_sensed_has_no_rays_of_another(tmp_path: Path, paper:
     recording.disconnect()
     assert sorted(series(tmp_path / "r.rrd", "/world/trail", "Points2D:positions")) == [0, 1, 2]
     assert sorted(series(tmp_path / "r.rrd", "/world/robot/sonar", "Clear:is_recursive")) == [2]
+
+
+def test_ticks_without_a_command_are_told_in_a_few_lines(tmp_path: Path, paper: Arena):
+    recording, told = rr.RecordingStream("test"), []
+    translator = Translator(recording, World("r", paper, 0, 0))
+    translator._text = lambda tick, text, *_: told.append(text)  # type: ignore[method-assign]
+    for tick, late in enumerate([0, 0, 1, 1, 3, 4, 5, 6]):
+        at = [0.0]
+        translator.sim(SimLog("r", tick, "s", "", [tick], [0], at, at, at, at, at, at, [0], [], late))
+    assert told == [f"{late} ticks without a command in time so far" for late in (1, 3, 6)]
