@@ -61,7 +61,7 @@ class Table(Learner):
 def make(monkeypatch: pytest.MonkeyPatch):
     """An agent with a learner whose methods are the given ones, called `theirs`."""
 
-    def agent(percept: str = "simple", learning: bool = True, **methods: Any) -> Agent:
+    def agent(percept: Any = "simple", learning: bool = True, **methods: Any) -> Agent:
         kind = type("Theirs", (Table,), methods)
         monkeypatch.setattr(module, "find", lambda _: kind)
         return Agent(
