@@ -128,7 +128,7 @@ def test_a_speed_that_nobody_can_keep_is_an_error_and_names_the_slower_part(up, 
         assert "t-slow-" in status.too_slow
     assert launcher.end() == 4
     assert '"late_ticks": 150' in launcher.stdout
-    assert "none of 150 ticks had a command in time" in launcher.stderr.splitlines()[-1]
+    assert "only 0 of 150 ticks had a command in time" in launcher.stderr.splitlines()[-1]
     assert "is too slow: " in launcher.stderr
 
 
