@@ -184,3 +184,13 @@ def test_low_space_is_told_once(recording: Recording, monkeypatch: pytest.Monkey
 
 def test_no_recording_is_overwritten(tmp_path: Path):
     assert [fresh_file(tmp_path / "r.rrd").name for _ in range(3)] == ["r.rrd", "r-2.rrd", "r-3.rrd"]
+
+
+def test_ticks_without_a_command_are_told_in_a_few_lines(tmp_path: Path, paper: Arena):
+    recording, told = rr.RecordingStream("test"), []
+    translator = Translator(recording, World("r", paper, 0, 0))
+    translator._text = lambda tick, text, *_: told.append(text)  # type: ignore[method-assign]
+    for tick, late in enumerate([0, 0, 1, 1, 3, 4, 5, 6]):
+        at = [0.0]
+        translator.sim(SimLog("r", tick, "s", "", [tick], [0], at, at, at, at, at, at, [0], [], late))
+    assert told == [f"{late} ticks without a command in time so far" for late in (1, 3, 6)]

@@ -15,7 +15,7 @@ from msgspec import Meta, Struct
 
 from phototaxis import doors
 from phototaxis.errors import Unavailable, UserError
-from phototaxis.sockets import agent_socket, one_after_another, in_use, socket_folder, sweep
+from phototaxis.sockets import agent_socket, in_use, one_after_another, socket_folder, sweep
 from phototaxis.topics import ROLES
 
 _WORLD = r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,39}"

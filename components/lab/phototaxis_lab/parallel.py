@@ -30,9 +30,7 @@ def outcomes(cells: Sequence[Cell], jobs: int = -1) -> Iterator[tuple[int, Outco
         yield from work(joblib.delayed(_numbered)(index, cells[index]) for index in order)
     except TerminatedWorkerError:
         learners = ", ".join(sorted({cell.system.learner for cell in cells}))
-        line = (
-            "a process that computes cells ended without a word: its learner ended it, crashed, or took too much memory"
-        )
+        line = "a process that learns ended without a word: its learner ended it, crashed, or took too much memory"
         raise ComponentFailed(f"{line} (learners: {learners})") from None
 
 

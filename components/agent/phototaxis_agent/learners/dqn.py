@@ -152,8 +152,8 @@ def _network(inputs: int, hidden: int, rng: np.random.Generator) -> torch.nn.Seq
     sizes = (inputs, hidden), (hidden, len(ACTIONS))
     layers = [torch.nn.utils.skip_init(torch.nn.Linear, *size) for size in sizes]
     with torch.no_grad():
-        for layer in layers:
+        for layer, (width, _) in zip(layers, sizes, strict=True):
             for parameter in layer.parameters():
-                bound = layer.in_features**-0.5
+                bound = width**-0.5
                 parameter.copy_(torch.from_numpy(rng.uniform(-bound, bound, tuple(parameter.shape))))
     return torch.nn.Sequential(layers[0], torch.nn.ReLU(), layers[1])
