@@ -15,13 +15,14 @@ from phototaxis.messages import World
 from phototaxis.task import CrowdReadings
 from phototaxis_gym.place import Here
 from phototaxis_gym.policy import PolicyAgent, PolicyFile
+from phototaxis_gym.sb3 import Robots
 from phototaxis_lab import evaluate
 from sb3_contrib import ARS, QRDQN, TQC, TRPO, CrossQ, MaskablePPO, RecurrentPPO
 from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3
 from stable_baselines3.common.callbacks import EvalCallback
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
+from stable_baselines3.common.vec_env import VecFrameStack, VecMonitor, VecNormalize
 
 NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
 CAP = 12
@@ -249,3 +250,28 @@ def test_stable_baselines_counts_successes(tmp_path):
     assert len(judge._is_success_buffer) == 4
     assert len(model.ep_success_buffer or ()) > 2
     assert np.load(tmp_path / "evaluations.npz")["successes"].shape[1] == 4
+
+
+def test_many_robots_are_a_vecenv_of_stable_baselines(quiet):
+    """Step by step as its own loop over single robots, with the last observations of episodes."""
+    options = {"percept": "sensors", "arena": quiet, "cap": 15}
+    ours, theirs = Robots(3, **options), make_vec_env(NAME, n_envs=3, env_kwargs=options)
+    rng, ends = np.random.default_rng(0), 0
+    for environment in (ours, theirs):
+        environment.seed(4)
+    np.testing.assert_allclose(np.asarray(ours.reset()), np.asarray(theirs.reset()), atol=1e-4)
+    for _ in range(60):
+        actions = rng.integers(9, size=3)
+        mine, its = ours.step(actions), theirs.step(actions)
+        for one, other in zip(mine[:3], its[:3], strict=True):
+            np.testing.assert_allclose(np.asarray(one), np.asarray(other), atol=1e-4)
+        for row in np.flatnonzero(mine[2]):
+            ends += 1
+            one, other = mine[3][row], its[3][row]
+            np.testing.assert_allclose(one["terminal_observation"], other["terminal_observation"], atol=1e-4)
+            assert one["is_success"] == other["is_success"]
+            assert one["TimeLimit.truncated"] == other["TimeLimit.truncated"]
+    assert ends > 8
+    model = PPO("MlpPolicy", VecMonitor(Robots(4, percept="continuous", cap=20)), device="cpu", n_steps=32, n_epochs=1)
+    model.learn(256)
+    assert len(model.ep_success_buffer or ()) > 2
