@@ -28,7 +28,7 @@ class Policy:
     Raises
     ------
     UserError
-        when the spaces are none of ours, or the observations were normalised and `normalize` is None.
+        when the spaces are none of ours.
     """
 
     def __init__(self, model: Any, file: Path, arena: Arena, normalize: Normalize | None = None):
@@ -38,11 +38,6 @@ class Policy:
         if not self.percept or not (self._discrete or model.action_space == spaces.Box(-1.0, 1.0, (2,), np.float32)):
             theirs = f"observes {short(space)} and acts in {model.action_space}"
             raise UserError(f"{file}: {theirs}: not the spaces of an environment of phototaxis{wrapped(space, arena)}")
-        if normalize is None and was_normalized(model):
-            raise UserError(
-                f"{file}: it was trained through VecNormalize and needs its statistics; give the file that "
-                f"VecNormalize.save has written: --normalize FILE.pkl (or none, if it normalised rewards only)"
-            )
         self._model, self._file, self._normalize = model, file, normalize
         self._observe, self._dtype = observation(self.percept, arena), space.dtype
         self.hidden: tuple[np.ndarray, ...] | None = None
@@ -179,10 +174,21 @@ class PolicyCrowd(Policy):
 
 
 class PolicyFile:
-    """Loads a policy at once, with the statistics of its observations, and makes agents of it."""
+    """Loads a policy at once, with the statistics of its observations, and makes agents of it.
+
+    Raises
+    ------
+    UserError
+        when a file cannot be loaded, or the policy was trained through VecNormalize and `normalize` is None.
+    """
 
     def __init__(self, file: Path, trusted: bool, normalize: Path | None = None):
         self._file, self._model = file, load(file, trusted)
+        if normalize is None and was_normalized(self._model):
+            raise UserError(
+                f"{file}: it was trained through VecNormalize and needs its statistics; give the file that "
+                f"VecNormalize.save has written: --normalize FILE.pkl (or none, if it normalised rewards only)"
+            )
         self._normalize = None if normalize is None else normalizer(normalize, trusted, self._model)
 
     def __call__(self, world: World, cap: int) -> PolicyAgent:
