@@ -1,5 +1,7 @@
 """The Gymnasium environment as a client of a running system: the same trajectories, rules and errors."""
 
+import copy
+import pickle
 import signal
 import subprocess
 import sys
@@ -12,7 +14,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import Error, InvalidAction, ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, Error, InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from phototaxis.ports import free_ports
 from rerun_files import series
@@ -123,8 +125,12 @@ def test_errors_are_gymnasiums_own(system, world, start):
         make(world, render_mode="rgb_array")
     with pytest.raises(Error, match="arena 'doorway': that is the running system's"):
         make(world, arena="doorway")
-    with pytest.raises(Error, match="seed 9007199254740993: Expected `int` <= 9007199254740992"):
-        environment.reset(seed=2**53 + 1)
+    with pytest.raises(TypeError, match="cannot be copied or pickled: it holds the driver's seat"):
+        copy.deepcopy(environment)
+    with pytest.raises(TypeError, match="cannot be copied or pickled: it holds the driver's seat"):
+        pickle.dumps(environment)
+    with pytest.raises(ValueError, match="a running system places its robots itself"):
+        environment.reset(options={"pose": (5, 5, 0)})
     environment.reset(seed=1)
     other = make(world)
     other.reset(seed=2)
@@ -134,8 +140,55 @@ def test_errors_are_gymnasiums_own(system, world, start):
     environment.step(0)
     environment.close()
     other.close()
-    with pytest.raises(Error, match="closed"):
-        environment.unwrapped.step(0)
+    for late in (lambda: environment.unwrapped.step(0), environment.reset, lambda: environment.reset(seed=1)):
+        with pytest.raises(ClosedEnvironmentError, match="closed"):
+            late()
+    environment.close()
+
+
+def test_any_seed_begins_the_same_run_here_and_there(system, world):
+    here, there = gymnasium.make(NAME, percept="sensors"), make(world, percept="sensors")
+    for seed in (2**53, 2**63 + 5, 2**100):
+        np.testing.assert_array_equal(here.reset(seed=seed)[0], there.reset(seed=seed)[0])
+        np.testing.assert_array_equal(here.reset()[0], there.reset()[0])
+    first, _ = make(world, percept="sensors").reset()
+    assert here.observation_space.contains(first)
+    there.close()
+
+
+def test_what_other_people_do_with_the_world_is_said(system, world):
+    environment = gymnasium.make(NAME, connect="local", world=world, timeout=1.0)
+    environment.reset(seed=5)
+    assert phototaxis("control", "pause", "--name", world).returncode == 0
+    with pytest.raises(Error, match=f"it is paused; phototaxis control resume --name {world}"):
+        environment.step(4)
+    assert phototaxis("control", "resume", "--name", world).returncode == 0
+    environment.step(4)
+    assert phototaxis("control", "begin", "--seed", 9, "--name", world).returncode == 0
+    with pytest.raises(Error, match=r"somebody else has begun a new run .* reset\(\) goes on in it"):
+        environment.step(4)
+    environment.reset()
+    assert environment.step(4)[4]["episode_number"] == 1
+    silent = gymnasium.make(NAME, connect="local", world=world, timeout=1.0)
+    with pytest.raises(Error, match=r"gymnasium-\w+ holds the seat and has not answered for \d"):
+        silent.reset(seed=1)  # the first one sits there and does nothing
+    environment.close()
+    silent.close()
+
+
+def test_a_finished_run_is_said(start, world):
+    system = start("sim", "--name", world, "--epochs", 3), start("sensors", "--name", world)
+    with observer(world) as bus:
+        wait_alive(bus, "sensors", *system)
+    environment = gymnasium.make(NAME, connect="local", world=world, timeout=1.5)
+    environment.reset(seed=1)
+    for _ in range(3):
+        environment.step(4)
+    with pytest.raises(Error, match=r"its run is finished; reset\(seed=…\) begins another"):
+        environment.step(4)
+    environment.reset(seed=2)
+    environment.step(4)
+    environment.close()
 
 
 def test_nobody_there(world):

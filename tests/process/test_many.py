@@ -1,5 +1,6 @@
 """Many robots in one world, over the bus: as in one process, one learner for all, bad columns do no harm."""
 
+import copy
 import os
 import signal
 from pathlib import Path
@@ -9,12 +10,13 @@ import gymnasium
 import numpy as np
 import pytest
 from fmus import Built
-from gymnasium.error import Error, InvalidAction
+from gymnasium.error import ClosedEnvironmentError, Error, InvalidAction
 from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
 from phototaxis.columns import FLAG, pack
 from phototaxis.messages import CommandOfMany, Control
 from phototaxis.session import BusOptions, open_session
+from phototaxis_sim import arenas
 from rerun_files import series
 from support import children, observer, phototaxis, result, wait, wait_alive, wait_status
 
@@ -58,6 +60,41 @@ def test_the_vector_environment_is_the_same_here_and_there(system, world, robots
     with pytest.raises(Error, match="give reset one number"):
         there.reset(seed=list(range(0, 2 * robots, 2)))
     there.close()
+
+
+def test_resets_of_some_robots_behind_the_bus(system, world, tmp_path):
+    """They take a tick of the running system, in which the others hold still: without noise nobody notices."""
+    paper = (Path(arenas.__file__).parent / "arenas/paper.toml").read_text()
+    (tmp_path / "quiet.toml").write_text(paper.replace("noise = 0.05", "noise = 0.0"))
+    system(4, "--arena", tmp_path / "quiet.toml")
+    options = {"num_envs": 4, "percept": "sensors", "cap": 20, "autoreset_mode": "SameStep"}
+    here = gymnasium.make_vec(NAME, arena=str(tmp_path / "quiet.toml"), **options)
+    there: Any = gymnasium.make_vec(NAME, connect="local", world=world, **options)
+    rng, ends = np.random.default_rng(0), 0
+    np.testing.assert_array_equal(here.reset(seed=2**90)[0], there.reset(seed=2**90)[0])
+    for step in range(60):
+        actions = rng.integers(9, size=4)
+        one, other = here.step(actions), there.step(actions)
+        for ours, theirs in zip(one[:4], other[:4], strict=True):
+            np.testing.assert_allclose(ours, theirs, atol=1e-4)
+        for row in np.flatnonzero(one[2] | one[3]):
+            ends += 1
+            np.testing.assert_allclose(one[4]["final_obs"][row], other[4]["final_obs"][row], atol=1e-4)
+            assert one[4]["final_info"]["is_success"][row] == other[4]["final_info"]["is_success"][row] == one[2][row]
+        if step == 30:
+            mask = {"reset_mask": np.array([False, True, False, True])}
+            np.testing.assert_allclose(here.reset(options=mask)[0], there.reset(options=mask)[0], atol=1e-4)
+            np.testing.assert_allclose(here.reset()[0], there.reset()[0], atol=1e-4)
+    assert ends > 8
+    with pytest.raises(Error, match="give reset one number, and no reset_mask"):
+        there.reset(seed=3, options=mask)
+    with pytest.raises(ValueError, match="a running system places its robots itself"):
+        there.reset(options={"pose": (5, 5, 0)})
+    with pytest.raises(TypeError, match="cannot be copied or pickled"):
+        copy.deepcopy(there)
+    there.close()
+    with pytest.raises(ClosedEnvironmentError):
+        there.reset(seed=1)
 
 
 def test_one_learner_drives_them_all_and_killed_sensors_change_nothing(up, world):

@@ -14,7 +14,8 @@ from typing import Any
 import gymnasium
 import pytest
 from phototaxis.messages import World
-from phototaxis_gym.policy import PolicyAgent, load
+from phototaxis_gym.policy import PolicyAgent
+from phototaxis_gym.policy_file import load
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim import arenas
 from phototaxis_sim.simulation import Simulation

@@ -36,7 +36,7 @@ class Options(ComponentOptions, kw_only=True):
     trust: bool = False
     """load the policy although such a file can run any code: you trust who made it"""
     normalize: str = ""
-    """statistics of the policy's observations: the file (.pkl) that VecNormalize.save has written"""
+    """statistics of the policy's observations: the file (.pkl) of VecNormalize.save, or none"""
     agent_seed: Seed | None = None
     """seed of the learner and its exploration (default: the run's)"""
 

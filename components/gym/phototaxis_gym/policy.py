@@ -22,13 +22,13 @@ _INDEX = {motors: index for index, motors in enumerate(ACTIONS)}
 class Policy:
     """A frozen policy for N robots: from what they sense to their motor commands, as it was trained.
 
-    Which percept and which actions it has follows from the model's spaces. A recurrent policy has a memory, which is
-    begun anew with each robot's episode.
+    Which percept and which actions it has follows from the model's spaces. What a recurrent policy remembers is begun
+    anew with each robot's episode.
 
     Raises
     ------
     UserError
-        when the spaces are none of ours, or the observations were normalised and `normalize` is None.
+        when the spaces are none of ours.
     """
 
     def __init__(self, model: Any, file: Path, arena: Arena, normalize: Normalize | None = None):
@@ -38,22 +38,18 @@ class Policy:
         if not self.percept or not (self._discrete or model.action_space == spaces.Box(-1.0, 1.0, (2,), np.float32)):
             theirs = f"observes {short(space)} and acts in {model.action_space}"
             raise UserError(f"{file}: {theirs}: not the spaces of an environment of phototaxis{wrapped(space, arena)}")
-        if normalize is None and was_normalized(model):
-            raise UserError(
-                f"{file}: it was trained through VecNormalize and needs its statistics; give the file that "
-                f"VecNormalize.save has written: --normalize FILE.pkl"
-            )
         self._model, self._file, self._normalize = model, file, normalize
         self._observe, self._dtype = observation(self.percept, arena), space.dtype
-        self.memory: tuple[np.ndarray, ...] | None = None
+        self.hidden: tuple[np.ndarray, ...] | None = None
+        """What a recurrent policy remembers of the episode."""
 
-    def __call__(self, senses: Any, history: Memory, starts: np.ndarray) -> np.ndarray:
+    def motors(self, senses: Any, history: Memory, starts: np.ndarray) -> np.ndarray:
         """(N, 2): the motor commands; `starts` (N,) says whose episode begins."""
         seen = np.asarray(self._observe(senses, history), self._dtype)
         seen = seen.reshape(len(starts), *self._model.observation_space.shape)
         if self._normalize is not None:
             seen = self._normalize(seen)
-        chosen, self.memory = self._model.predict(seen, self.memory, episode_start=starts, deterministic=True)
+        chosen, self.hidden = self._model.predict(seen, self.hidden, episode_start=starts, deterministic=True)
         return MOTORS[chosen] if self._discrete else np.asarray(chosen, float)
 
     def remember(self, arrays: dict[str, np.ndarray], source: str) -> None:
@@ -64,11 +60,11 @@ class Policy:
         UserError
             when it has another shape; `source` names it.
         """
-        memory = tuple(arrays[name] for name in sorted(arrays)) or None
+        hidden = tuple(arrays[name] for name in sorted(arrays)) or None
         shape = getattr(self._model.policy, "lstm_hidden_state_shape", None)
-        if memory and any(part.shape != tuple(shape or ()) for part in memory):
+        if hidden and any(part.shape != tuple(shape or ()) for part in hidden):
             raise UserError(f"{source}: its memory does not fit the policy in {self._file}")
-        self.memory = memory
+        self.hidden = hidden
 
 
 def short(space: Any) -> str:
@@ -93,20 +89,15 @@ def wrapped(space: Any, arena: Arena) -> str:
     return ""
 
 
-class PolicyAgent:
-    """Turns readings into the commands of a frozen policy; has what the agent's process asks of an `Agent`.
-
-    Raises
-    ------
-    UserError
-        as in `Policy`.
-    """
+class PolicyAgent(Policy):
+    """Turns readings into the commands of a frozen policy; has what the agent's process asks of an `Agent`."""
 
     def __init__(self, model: Any, file: Path, world: World, cap: int, normalize: Normalize | None = None):
         self.name = self.author = f"policy-{file.stem}"
+        super().__init__(model, file, world.arena, normalize)
         self.enter(world.arena)
-        self._policy, self._cap = Policy(model, file, world.arena, normalize), cap
-        percept = self._policy.percept
+        self._cap = cap
+        percept = self.percept
         self._reward = rewards("own", percept)
         self.task = convert(TaskOptions, {"percept": "continuous" if percept == "sensors" else percept, "cap": cap})
         self._memory = Memory()
@@ -123,7 +114,7 @@ class PolicyAgent:
         """Answer one tick."""
         if readings.run != self._run or readings.episode != self._episode or readings.tick != self._tick + 1:
             self._memory.clear()
-            self._policy.memory = None
+            self.hidden = None
             self._run, self._episode, self._steps = readings.run, readings.episode, -1
         self._tick, self._steps = readings.tick, self._steps + 1
         memory = self._memory
@@ -132,7 +123,7 @@ class PolicyAgent:
         end: End = "reached" if lit(readings) else "cap" if self._steps >= self._cap else ""
         action, left, right = -1, 0.0, 0.0
         if not end:
-            ((left, right),) = self._policy(readings, memory, np.array([self._steps == 0])).tolist()
+            ((left, right),) = self.motors(readings, memory, np.array([self._steps == 0])).tolist()
             action = _INDEX.get((left, right), -1)
         self.last = (0, action, reward, 0.0, 0.0)
         self.command = Command(readings.run, readings.tick, self.author, left, right, end)
@@ -153,7 +144,7 @@ class PolicyAgent:
 
     def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
         """Where it is in its episode, for a successor with the same policy; the policy itself is in its file."""
-        command, arrays = self.command, {f"memory_{at}": part for at, part in enumerate(self._policy.memory or ())}
+        command, arrays = self.command, {f"hidden_{at}": part for at, part in enumerate(self.hidden or ())}
         meta = Meta(
             learner=self.name, percept=self.task.percept, reward="own", cap=self._cap, hyperparameters={},
             exploration={}, budget=0, run=self._run, tick=self._tick, episode=self._episode, epoch=0, steps=self._steps,
@@ -166,31 +157,43 @@ class PolicyAgent:
 
     def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
         """Continue where another one with the same policy is."""
-        self._policy.remember(arrays, source)
+        self.remember(arrays, source)
         self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
         self._memory.clear()
         self._memory.lights.extend(meta.lights)
         self.command = None if meta.answer is None else Command(meta.run, meta.tick, self.author, *meta.answer)
 
 
-class PolicyCrowd:
+class PolicyCrowd(Policy):
     """Drives N robots through one episode each, all of which begin at the same tick."""
 
-    def __init__(self, policy: Policy):
-        self._policy, self._memory = policy, Memory()
+    def __init__(self, model: Any, file: Path, arena: Arena, normalize: Normalize | None = None):
+        super().__init__(model, file, arena, normalize)
+        self._memory = Memory()
 
     def __call__(self, readings: CrowdReadings) -> np.ndarray:
         """The motor commands (N, 2) of one tick."""
         starts = np.full(len(readings.front), not self._memory.lights)
         self._memory.see(readings)
-        return self._policy(readings, self._memory, starts)
+        return self.motors(readings, self._memory, starts)
 
 
 class PolicyFile:
-    """Loads a policy at once, with the statistics of its observations, and makes agents of it."""
+    """Loads a policy at once, with the statistics of its observations, and makes agents of it.
+
+    Raises
+    ------
+    UserError
+        when a file cannot be loaded, or the policy was trained through VecNormalize and `normalize` is None.
+    """
 
     def __init__(self, file: Path, trusted: bool, normalize: Path | None = None):
         self._file, self._model = file, load(file, trusted)
+        if normalize is None and was_normalized(self._model):
+            raise UserError(
+                f"{file}: it was trained through VecNormalize and needs its statistics; give the file that "
+                f"VecNormalize.save has written: --normalize FILE.pkl (or none, if it normalised rewards only)"
+            )
         self._normalize = None if normalize is None else normalizer(normalize, trusted, self._model)
 
     def __call__(self, world: World, cap: int) -> PolicyAgent:
@@ -200,4 +203,4 @@ class PolicyFile:
 
     def crowd(self, arena: Arena) -> PolicyCrowd:
         """What drives many robots in an evaluation."""
-        return PolicyCrowd(Policy(self._model, self._file, arena, self._normalize))
+        return PolicyCrowd(self._model, self._file, arena, self._normalize)

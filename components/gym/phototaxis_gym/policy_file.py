@@ -75,13 +75,15 @@ def load(file: Path, trusted: bool) -> Any:
 
 
 def normalizer(file: Path, trusted: bool, model: Any) -> Normalize:
-    """The statistics that `VecNormalize.save` has written.
+    """The statistics that `VecNormalize.save` has written; "none" in place of a file: observations stay as they are.
 
     Raises
     ------
     UserError
         when the file is not trusted, not such a file, or of other observations than the model's.
     """
+    if str(file) == "none":
+        return lambda seen: seen
     if not file.is_file():
         raise UserError(f"--normalize {file}: there is no such file")
     require_trust(file, trusted)
@@ -103,7 +105,7 @@ def normalizer(file: Path, trusted: bool, model: Any) -> Normalize:
 
 
 def was_normalized(model: Any) -> bool:
-    """Whether the last observation of the training was not the environment's own but VecNormalize's."""
+    """Whether the training went through VecNormalize, unless its last observation proves to be the environment's."""
     seen, original = model._last_obs, model._last_original_obs
     return original is not None and not np.array_equal(seen, original)
 

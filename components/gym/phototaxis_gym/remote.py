@@ -133,8 +133,11 @@ class Link:
                 self._now = event.message
 
     def _sit(self) -> None:
-        """Take the seat, if it is not ours."""
-        self._seek("take over")
+        """Take the seat, if it is not ours. A finished run sends no readings that could show whose it is."""
+        self._sought_at = time.monotonic()
+        reply = self._bus.control(Control("take over", self.ident), timeout=self._timeout)
+        if reply is not None and reply.status.driver == self.ident:
+            return
         self._hear(lambda readings: readings.driver == self.ident, lambda _: self._seek("take over"), seated=False)
 
     def _seek(self, verb: Literal["claim", "take over"]) -> None:
@@ -186,7 +189,9 @@ class Link:
         if status.phase == "paused":
             return f"it is paused; phototaxis control resume --name {self._bus.name} lets it go on"
         if status.phase == "finished":
-            return "its run is finished; reset(seed=…) begins another"
+            own = status.driver in ("", self.ident)
+            again = "reset(seed=…)" if own else f"phototaxis control begin --name {self._bus.name}"
+            return f"its run is finished; {again} begins another"
         if status.driver not in ("", self.ident):
             return f"{status.driver} holds the seat and has not answered for {status.waited:.1f} s"
         return f"it waits for {status.waiting_for}" if status.waiting_for else "though all are there"

@@ -31,7 +31,7 @@ class Options(Struct, kw_only=True):
     trust: bool = False
     """load a .zip although such a file can run any code: you trust who made it"""
     normalize: str = ""
-    """statistics of a .zip's observations: the file (.pkl) that VecNormalize.save has written"""
+    """statistics of a .zip's observations: the file (.pkl) of VecNormalize.save, or none"""
     json: bool = False
     """print the result as one JSON object"""
 

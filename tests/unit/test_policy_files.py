@@ -1,0 +1,277 @@
+"""Files of Stable-Baselines3 and sb3-contrib: they drive as they were trained, or are refused by name."""
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from phototaxis.arena import Arena
+from phototaxis.checkpoint import decode, encode
+from phototaxis.errors import UserError
+from phototaxis.messages import World
+from phototaxis.task import CrowdReadings
+from phototaxis_gym.place import Here
+from phototaxis_gym.policy import PolicyAgent, PolicyFile
+from phototaxis_gym.sb3 import Robots
+from phototaxis_lab import evaluate
+from sb3_contrib import ARS, QRDQN, TQC, TRPO, CrossQ, MaskablePPO, RecurrentPPO
+from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3
+from stable_baselines3.common.callbacks import EvalCallback
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.vec_env import VecFrameStack, VecMonitor, VecNormalize
+
+NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
+CAP = 12
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    """The nets are small: threads only cost."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+class OwnPolicy(ActorCriticPolicy):
+    """A class that only its author has."""
+
+
+def save(
+    kind: Any, folder: Path, policy: Any = "MlpPolicy", percept="sensors", action="continuous", **more: Any
+) -> Path:
+    """A file with an untrained policy."""
+    file = folder / "policy.zip"
+    kind(policy, gymnasium.make(NAME, percept=percept, action=action), device="cpu", seed=1, **more).save(file)
+    return file
+
+
+def agent(file: Path, paper: Arena, **more: Any) -> PolicyAgent:
+    return PolicyFile(file, trusted=True, **more)(World("x", paper, 5, 0), CAP)
+
+
+def drive(agents: list[PolicyAgent], paper: Arena, ticks: int) -> list[list[tuple[float, float, str]]]:
+    """The commands of agents that see the same; the first one drives."""
+    place, found = Here(paper), []
+    readings = place.begin(5)
+    for _ in range(ticks):
+        commands = [one(readings) for one in agents]
+        found.append([(command.left, command.right, command.end) for command in commands])
+        first = commands[0]
+        readings = place.place(first.end) if first.end else place.drive(first.left, first.right)
+    return found
+
+
+def expected(model: Any, ticks: int, normalize: Any = lambda seen: seen, **options: Any) -> list[tuple]:
+    """The commands that `predict` chooses as its documentation has it, for the same placements."""
+    environment: Any = gymnasium.make(NAME, cap=CAP, **options)
+    seen, _ = environment.reset(seed=5)
+    found, memory, start = list[tuple](), None, True
+    while len(found) < ticks:
+        action, memory = model.predict(
+            normalize(seen), state=memory, episode_start=np.array([start]), deterministic=True
+        )
+        seen, _, terminated, truncated, _ = environment.step(action)
+        start = terminated or truncated
+        readings = environment.unwrapped._readings
+        found.append((readings.left, readings.right, ""))
+        if start:
+            found.append((0.0, 0.0, "reached" if terminated else "cap"))
+            seen, _ = environment.reset()
+    return found[:ticks]
+
+
+ANY = [
+    (A2C, "discrete"), (PPO, "discrete"), (PPO, "continuous"), (DQN, "discrete"), (SAC, "continuous"),
+    (TD3, "continuous"), (DDPG, "continuous"), (ARS, "discrete"), (ARS, "continuous"), (QRDQN, "discrete"),
+    (TQC, "continuous"), (TRPO, "continuous"), (CrossQ, "continuous"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "action"), ANY)
+def test_every_algorithm_drives_as_its_own_predict(kind, action, paper, tmp_path):
+    file = save(kind, tmp_path, action=action)
+    found = [commands[0] for commands in drive([agent(file, paper)], paper, 30)]
+    assert found == expected(kind.load(file), 30, percept="sensors", action=action)
+
+
+@pytest.mark.parametrize("percept", ["simple", "sensors"])
+def test_a_recurrent_policy_keeps_its_memory_within_each_episode(percept, paper, tmp_path):
+    file = save(RecurrentPPO, tmp_path, "MlpLstmPolicy", percept=percept)
+    found = [commands[0] for commands in drive([agent(file, paper)], paper, 30)]
+    model = RecurrentPPO.load(file)
+    assert found == expected(model, 30, percept=percept, action="continuous")
+
+    class Forgetful:
+        def predict(self, seen: Any, **_: Any) -> Any:
+            return model.predict(seen, deterministic=True)
+
+    assert found != expected(Forgetful(), 30, percept=percept, action="continuous")
+
+
+def test_a_successor_inherits_the_memory(paper, tmp_path):
+    file = save(RecurrentPPO, tmp_path, "MlpLstmPolicy")
+    first, second = agent(file, paper), agent(file, paper)
+    drive([first], paper, 7)
+    second.restore(*decode(encode(*first.checkpoint()), "first"), "first")
+    for hidden, other in zip(first.hidden or (), second.hidden or (), strict=True):
+        np.testing.assert_array_equal(hidden, other)
+    assert first.hidden is not None
+    other = agent(save(PPO, tmp_path), paper)
+    with pytest.raises(UserError, match="first: its memory does not fit the policy in"):
+        other.restore(*first.checkpoint(), "first")
+
+
+def test_many_robots_are_driven_as_one(paper, tmp_path):
+    """In an evaluation: each robot has a memory of its own."""
+    file = save(RecurrentPPO, tmp_path, "MlpLstmPolicy")
+    crowd, alone = PolicyFile(file, trusted=True).crowd(paper), agent(file, paper)
+    place = Here(paper)
+    readings = place.begin(5)
+    for _ in range(8):
+        rows = CrowdReadings(
+            np.array([readings.sonar, [8.0] * 16]).T, np.array([readings.light, (0.1, 0.2)]).T,
+            np.array([readings.front, False]), np.array([readings.rear, True]),
+        )  # fmt: skip
+        command = alone(readings)
+        np.testing.assert_allclose(crowd(rows)[0], (command.left, command.right), atol=1e-6)
+        readings = place.drive(command.left, command.right)
+
+
+def normalized(folder: Path, **more: Any) -> tuple[Path, VecNormalize]:
+    """A policy that has learned a little through VecNormalize, and its statistics."""
+    robots = VecNormalize(make_vec_env(NAME, n_envs=2, seed=1, env_kwargs={"percept": "continuous"}), **more)
+    model = PPO("MlpPolicy", robots, device="cpu", seed=1, n_steps=32, n_epochs=1)
+    model.learn(64)
+    model.save(folder / "policy.zip")
+    robots.save(str(folder / "statistics.pkl"))
+    return folder / "policy.zip", robots
+
+
+def test_the_statistics_of_vecnormalize_are_taken_along(paper, tmp_path):
+    file, robots = normalized(tmp_path)
+    with pytest.raises(
+        UserError, match=r"trained through VecNormalize and needs its statistics.*--normalize FILE\.pkl"
+    ):
+        agent(file, paper)
+    driver = agent(file, paper, normalize=tmp_path / "statistics.pkl")
+    found = [commands[0] for commands in drive([driver], paper, 30)]
+    assert found == expected(PPO.load(file), 30, robots.normalize_obs, percept="continuous")
+
+
+def test_only_normalised_rewards_need_no_statistics(paper, tmp_path):
+    file, _ = normalized(tmp_path, norm_obs=False)
+    wanted = expected(PPO.load(file), 30, percept="continuous")
+    for statistics in (tmp_path / "statistics.pkl", Path("none")):
+        driver = agent(file, paper, normalize=statistics)
+        assert [commands[0] for commands in drive([driver], paper, 30)] == wanted
+
+
+def test_statistics_that_do_not_fit_are_one_line(paper, tmp_path):
+    file, _ = normalized(tmp_path)
+    (tmp_path / "list.pkl").write_bytes(pickle.dumps([1]))
+    (tmp_path / "text.pkl").write_text("x")
+    (tmp_path / "other").mkdir()
+    other = save(PPO, tmp_path / "other")
+    for policy, statistics, line in (
+        (file, "none.pkl", "none.pkl: there is no such file"),
+        (file, "list.pkl", "not what VecNormalize.save writes, but a list"),
+        (file, "text.pkl", "text.pkl: cannot be loaded: "),
+        (other, "statistics.pkl", r"statistics of observations of the shape \(12,\); the policy observes"),
+    ):
+        with pytest.raises(UserError, match=line):
+            agent(policy, paper, normalize=tmp_path / statistics)
+
+
+def stacked(folder: Path) -> None:
+    robots = VecFrameStack(make_vec_env(NAME, n_envs=1, env_kwargs={"percept": "continuous"}), 4)
+    PPO("MlpPolicy", robots, device="cpu").save(folder / "policy.zip")
+
+
+def running_mean(folder: Path) -> None:
+    environment = gymnasium.wrappers.NormalizeObservation(gymnasium.make(NAME, percept="continuous"))
+    PPO("MlpPolicy", environment, device="cpu").save(folder / "policy.zip")
+
+
+@pytest.mark.parametrize(
+    ("make", "line"),
+    [
+        (stacked, r"observes Box.*\(48,\).*4 frames of continuous stacked\? .* not supported"),
+        (running_mean, r"continuous through NormalizeObservation\? train through VecNormalize"),
+        (
+            lambda folder: save(MaskablePPO, folder, action="discrete"),
+            "policies of MaskablePPO are not supported: which",
+        ),
+    ],
+)
+def test_what_cannot_drive_as_it_was_trained_is_refused_by_name(make, line, paper, tmp_path):
+    make(tmp_path)
+    with pytest.raises(UserError, match=line):
+        agent(tmp_path / "policy.zip", paper)
+
+
+def test_a_policy_of_a_class_of_ones_own_is_recognised(paper, tmp_path):
+    file = save(PPO, tmp_path, OwnPolicy)
+    found = [commands[0] for commands in drive([agent(file, paper)], paper, 20)]
+    assert found == expected(PPO.load(file), 20, percept="sensors", action="continuous")
+
+
+def test_evaluate_takes_such_files(tmp_path, capsys):
+    file, _ = normalized(tmp_path)
+    words = [str(file), "--placements", "3", "--cap", "5", "--json"]
+    for more, line in (
+        ([], "add --trust"),
+        (["--trust"], "needs its statistics"),
+        (["--trust", "--normalize", str(tmp_path / "no.pkl")], "there is no such file"),
+    ):
+        with pytest.raises(UserError, match=line):
+            evaluate.main([*words, *more])
+    assert evaluate.main([*words, "--trust", "--normalize", str(tmp_path / "statistics.pkl")]) == 0
+    assert '"placements":3' in capsys.readouterr().out
+    with pytest.raises(UserError, match="--normalize belongs to a policy"):
+        evaluate.main(["kept.npz", "--normalize", "x.pkl"])
+
+
+def test_stable_baselines_counts_successes(tmp_path):
+    robots = make_vec_env(NAME, n_envs=2, seed=1, env_kwargs={"percept": "continuous", "cap": 30})
+    judge = EvalCallback(
+        make_vec_env(NAME, n_envs=2, env_kwargs={"cap": 30, "percept": "continuous"}),
+        n_eval_episodes=4,
+        eval_freq=64,
+        verbose=0,
+        log_path=str(tmp_path),
+    )
+    model = PPO("MlpPolicy", robots, device="cpu", n_steps=64, n_epochs=1)
+    model.learn(256, judge)
+    assert len(judge._is_success_buffer) == 4
+    assert len(model.ep_success_buffer or ()) > 2
+    assert np.load(tmp_path / "evaluations.npz")["successes"].shape[1] == 4
+
+
+def test_many_robots_are_a_vecenv_of_stable_baselines(quiet):
+    """Step by step as its own loop over single robots, with the last observations of episodes."""
+    options = {"percept": "sensors", "arena": quiet, "cap": 15}
+    ours, theirs = Robots(3, **options), make_vec_env(NAME, n_envs=3, env_kwargs=options)
+    rng, ends = np.random.default_rng(0), 0
+    for environment in (ours, theirs):
+        environment.seed(4)
+    np.testing.assert_allclose(np.asarray(ours.reset()), np.asarray(theirs.reset()), atol=1e-4)
+    for _ in range(60):
+        actions = rng.integers(9, size=3)
+        mine, its = ours.step(actions), theirs.step(actions)
+        for one, other in zip(mine[:3], its[:3], strict=True):
+            np.testing.assert_allclose(np.asarray(one), np.asarray(other), atol=1e-4)
+        for row in np.flatnonzero(mine[2]):
+            ends += 1
+            one, other = mine[3][row], its[3][row]
+            np.testing.assert_allclose(one["terminal_observation"], other["terminal_observation"], atol=1e-4)
+            assert one["is_success"] == other["is_success"]
+            assert one["TimeLimit.truncated"] == other["TimeLimit.truncated"]
+    assert ends > 8
+    model = PPO("MlpPolicy", VecMonitor(Robots(4, percept="continuous", cap=20)), device="cpu", n_steps=32, n_epochs=1)
+    model.learn(256)
+    assert len(model.ep_success_buffer or ()) > 2
