@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 from msgspec import Struct
-from phototaxis.disk import append_whole, try_folder, unwritten, write_whole
+from phototaxis.disk import append_whole, make_folder, try_folder, unwritten, write_whole
 from phototaxis.errors import Unavailable, UserError, warn
 from phototaxis_sim import arenas
 
@@ -41,6 +41,7 @@ class Results:
         grid, encoded = folder / "grid.json", _grid(self.cells)
         self._waiting: list[bytes] = []
         try_folder(folder, "--out")
+        make_folder(folder)
         try:
             if not grid.exists():
                 write_whole(grid, encoded)

@@ -12,7 +12,7 @@ from typing import Annotated
 from msgspec import Meta
 from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
-from phototaxis.disk import try_folder
+from phototaxis.disk import make_folder, try_folder
 from phototaxis.errors import ComponentFailed, Unavailable, UserError, warn
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import MOST, Count, Launch, LaunchReply, Seed, Status, run_name
@@ -68,7 +68,8 @@ class Run:
         swaps = swap_plan(options.swap)
         self.name = run_name()
         self.folder = Path(options.out).resolve() / self.name
-        try_folder(self.folder, f"--out {options.out}:")
+        try_folder(Path(options.out), "--out")
+        make_folder(self.folder)
         self._lost: UserError | None = None
         """How the recorder ended before the run did."""
         self.checkpoint = self._checkpoint("agent")
