@@ -105,6 +105,7 @@ def test_what_was_not_kept_is_not_continued(start, world, tmp_path, role):
         "reproduce --results {}",
         "certs --out {}",
         "fmu build light --sources-only --output {}",
+        "view nothing --picture {}.png",
         "check wire --write --file {}",
     ],
 )
