@@ -58,12 +58,12 @@ def main() -> None:
     model = algorithm("MlpPolicy", environment, seed=options.seed, device="cpu", **HYPERPARAMETERS[options.learner])
     model.learn(options.steps)
     environment.close()
-    if options.save:
-        model.save(options.save)
     print(
         f"{options.learner}, {model.num_timesteps} steps, seed {options.seed}: "
         f"{success(model):.1%} of 200 fresh placements"
     )
+    if options.save:
+        model.save(options.save)
 
 
 if __name__ == "__main__":

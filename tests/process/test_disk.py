@@ -2,11 +2,14 @@
 
 import json
 import signal
+import subprocess
 from pathlib import Path
 
 import msgspec
 import pytest
+from phototaxis.errors import Unavailable
 from phototaxis.journal import GIVEN_UP, Journal
+from phototaxis_launcher.processes import Child
 from phototaxis_sim import arenas
 from phototaxis_sim.simulation import Simulation
 from rerun_files import newest_tick
@@ -117,3 +120,23 @@ def test_every_place_is_tried_before_the_work_begins(tmp_path, monkeypatch, word
     assert "/dev/null" in done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir()), "nothing is left where nothing began"
+
+
+def test_a_full_log_changes_no_exit_code():
+    for words in (("sim", "--journal", "nowhere/j"), ("train", "--checkpoint", "nowhere/c.npz")):
+        with Path("/dev/full").open("w") as full:
+            assert subprocess.run(command(*words), stderr=full, check=False).returncode == 2
+
+
+def test_a_component_whose_log_is_gone_is_told_with_the_reason(tmp_path, monkeypatch):
+    (tmp_path / "full.py").write_text("import shutil; shutil.rmtree('logs'); raise SystemExit(3)")
+    (tmp_path / "logs").mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    child = Child("full", "full", [], Path("logs"))
+    child.start()
+    assert child.process is not None
+    child.process.wait()
+    with pytest.raises(Unavailable, match=r"full: exit code 3; its log logs/full\.log: there is no folder logs"):
+        child.watch()
+    child.stop(1.0)
