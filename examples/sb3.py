@@ -63,12 +63,12 @@ def main() -> None:
     with Progress(options.steps, "steps") as progress:
         model.learn(options.steps, callback=lambda *_: progress.add() is None)
     environment.close()
-    if options.save:
-        model.save(options.save)
     print(
         f"{options.learner}, {model.num_timesteps} steps, seed {options.seed}: "
         f"{success(model):.1%} of 200 fresh placements"
     )
+    if options.save:
+        model.save(options.save)
 
 
 if __name__ == "__main__":

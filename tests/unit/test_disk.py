@@ -1,5 +1,6 @@
 """A full, limited or unwritable disk: told before the work begins, in one line, and no file is ever left in part."""
 
+import json
 import os
 from pathlib import Path
 
@@ -8,14 +9,17 @@ from disks import no_file_larger_than
 from phototaxis.disk import try_file, try_folder, write_whole
 from phototaxis.errors import Unavailable, UserError
 from phototaxis.journal import GIVEN_UP, Journal
+from phototaxis_lab import train
+from phototaxis_lab.cell import Cell, Outcome, System
+from phototaxis_lab.results import Results
 
 
 @pytest.mark.parametrize("try_place", [try_file, try_folder])
 def test_a_place_that_takes_nothing_is_told_before_the_work_begins(tmp_path: Path, try_place):
     with no_file_larger_than(100), pytest.raises(Unavailable, match=r"--out .*/x: File too large; free some space"):
         try_place(tmp_path / "x", "--out")
-    assert not list(tmp_path.iterdir())
     try_place(tmp_path / "x", "--out")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_place_that_is_none_is_bad_input(tmp_path: Path):
@@ -141,3 +145,36 @@ def test_what_is_no_journal_is_not_taken_for_an_empty_one(tmp_path: Path):
     for path in (notes, damaged.path, tmp_path):
         with pytest.raises(UserError, match=f"{path.name}: (not a journal|.*damaged at byte 12|Is a directory)"):
             Journal(path).read()
+
+
+def test_what_was_learned_is_told_before_it_cannot_be_saved(tmp_path: Path, capsys):
+    file = tmp_path / "c.npz"
+    file.write_bytes(b"older")
+    words = ["--epochs", "30", "--percept", "rich", "--checkpoint", str(file)]
+    for more in ([], ["--json"]):
+        with no_file_larger_than(5000), pytest.raises(Unavailable, match=r"c\.npz: File too large"):
+            train.main([*words, *more])
+        told = capsys.readouterr().out
+        assert "episodes" in told
+    assert json.loads(told)["checkpoint"] is None
+    assert file.read_bytes() == b"older"
+    assert [path.name for path in tmp_path.iterdir()] == ["c.npz"]
+
+
+def test_outcomes_without_room_are_written_as_soon_as_there_is_some(tmp_path: Path, capsys):
+    cells = [Cell(System("qtable"), 10, seed) for seed in range(4)]
+    outcomes = [Outcome(seed, 1.0, 1.0, 1.0, 1.0, "", 0, [0.5] * 100, [1] * 24, 0.0) for seed in range(4)]
+    results = Results(tmp_path, cells)
+    results.add(0, outcomes[0])
+    lines = tmp_path / "results.jsonl"
+    size = lines.stat().st_size
+    with no_file_larger_than(size + 100):
+        results.add(1, outcomes[1])
+        results.add(2, outcomes[2])
+        with pytest.raises(Unavailable, match=r"results\.jsonl: File too large"):
+            results.settle()
+    assert lines.stat().st_size == size
+    assert capsys.readouterr().err.count("File too large; the outcomes from now on are lost if") == 1
+    assert results.missing == [3]
+    results.add(3, outcomes[3])
+    assert Results(tmp_path, cells).done == dict(enumerate(outcomes))

@@ -143,8 +143,8 @@ def test_a_recording_that_cannot_grow_ends_with_its_summary(recording: Recording
     assert 0 < summary.tick < 2999
     assert sorted(kept) == list(range(summary.tick + 1))
     assert recording.kept == summary.tick
-    assert recording.fault == f"{recording.file}: File too large"
-    said = f"phototaxis: warning: {recording.fault}; recorded up to tick {summary.tick}, the live view goes on\n"
+    assert recording.fault == f"{recording.file}: File too large; recorded up to tick {summary.tick}"
+    said = f"phototaxis: warning: {recording.fault}\n"
     assert capfd.readouterr().err.count(said) == 1
     assert not [path for path in recording.file.parent.iterdir() if path.suffix in (".new", ".part")]
 
@@ -162,7 +162,7 @@ def test_a_recording_whose_folder_is_gone_says_so(recording: Recording):
     shutil.rmtree(recording.file.parent)
     record(recording, 200)
     recording.close()
-    assert recording.fault == f"{recording.file}: No such file or directory"
+    assert recording.fault == f"{recording.file}: No such file or directory; recorded up to tick 99"
     assert recording.kept == 99
 
 
@@ -171,14 +171,14 @@ def test_a_recording_without_a_place_is_a_live_view(tmp_path: Path, paper: Arena
     recording = Recording(World("r", paper, 0, 0), wanted, "127.0.0.1", free_ports(1)[0], "16MiB")
     record(recording, 100)
     recording.close()
-    assert recording.fault == f"{wanted}: No such file or directory"
+    assert recording.fault == f"{wanted}: No such file or directory; nothing is recorded"
 
 
 def test_low_space_is_told_once(recording: Recording, monkeypatch: pytest.MonkeyPatch, capsys):
     monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10**9, 10**9 - 10**7, 10**7))
     record(recording, 300)
     recording.close()
-    assert capsys.readouterr().err.count("only 10 MB are left on its disk") == 1
+    assert capsys.readouterr().err.count("less than 200 MB are left on its disk") == 1
     assert not recording.fault
 
 

@@ -37,16 +37,25 @@ def try_file(path: Path, option: str) -> None:
 
 
 def try_folder(folder: Path, option: str) -> None:
-    """Make a folder where it is missing, and find out whether files can be written in it; see `try_file`."""
+    """Find out now whether a folder is there or can be made, and files be written in it; see `try_file`."""
     made = [part for part in (folder, *folder.parents) if not part.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _try(folder / ".trial")
     except OSError as error:
+        raise _refused(folder, option, error) from None
+    finally:
         for part in made:
             with suppress(OSError):
                 part.rmdir()
-        raise _refused(folder, option, error) from None
+
+
+def make_folder(folder: Path, mode: int = 0o777) -> None:
+    """Make a folder that has been tried, if it is missing; `Unavailable` when that is not possible any more."""
+    try:
+        folder.mkdir(mode, parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritten(folder, error) from None
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -127,4 +136,5 @@ def _beside(path: Path) -> Path:
 def _refused(path: Path, option: str, error: OSError) -> UserError:
     if error.errno in FULL:
         return Unavailable(f"{option} {path}: {error.strerror}; free some space, or choose another place")
-    return UserError(f"{option} {path}: {error.strerror}; choose another place")
+    why = "Not a directory" if isinstance(error, FileExistsError) else error.strerror
+    return UserError(f"{option} {path}: {why}; choose another place")

@@ -252,8 +252,8 @@ class Recorded(Message):
     run: Name
     tick: Annotated[int, Meta(ge=-1)] = -1
     """The newest tick that is on disk; −1 for none."""
-    fault: str = ""
-    """Why nothing more is written to disk, in a line; "" while all is well."""
+    warning: str = ""
+    """Why nothing more is written to disk, or soon will not be, in a line; "" while all is well."""
 
 
 class Control(Message):

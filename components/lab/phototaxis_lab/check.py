@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import zenoh
 from msgspec import Meta
 from phototaxis import doors, rights, wire
-from phototaxis.disk import try_folder, write_whole
+from phototaxis.disk import make_folder, try_folder, write_whole
 from phototaxis.errors import UserError
 from phototaxis.options import parse
 from phototaxis.router import router_config, text
@@ -97,5 +97,6 @@ def _wire(options: Options) -> int:
 
 def _put(file: Path, content: str) -> None:
     try_folder(file.parent, "--file")
+    make_folder(file.parent)
     write_whole(file, content.encode())
     print(file, file=sys.stderr)

@@ -5,7 +5,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from phototaxis.disk import try_folder
+from phototaxis.disk import make_folder, try_folder
 from phototaxis.options import parse
 
 from phototaxis_lab.running import SEEDS, Running, seed_range
@@ -41,6 +41,7 @@ def main(argv: Sequence[str]) -> int:
         name: {epochs: found[system, epochs] for epochs in budgets} for name, (system, budgets) in plan.WHOLE.items()
     }
     print("writing the page and its figures", file=sys.stderr)
+    make_folder(out)
     page.write(out, data, seeds)
     print(out / "README.md")
     return 0

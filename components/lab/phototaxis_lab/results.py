@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 from msgspec import Struct
-from phototaxis.disk import append_whole, try_folder, unwritten, write_whole
+from phototaxis.disk import append_whole, make_folder, try_folder, unwritten, write_whole
 from phototaxis.errors import Unavailable, UserError, warn
 from phototaxis.words import plain
 from phototaxis_sim import arenas
@@ -50,6 +50,7 @@ class Results:
         self._path, self.cells = folder / "results.jsonl", list(cells)
         self._waiting: list[bytes] = []
         try_folder(folder, "--out")
+        make_folder(folder)
         try:
             self._extend(folder / "grid.json")
             self.done: dict[int, Outcome] = self._read()

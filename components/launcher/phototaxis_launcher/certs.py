@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta, Struct
-from phototaxis.disk import try_folder, unwritten
+from phototaxis.disk import make_folder, try_folder, unwritten
 from phototaxis.errors import UserError
 from phototaxis.options import parse
 from phototaxis.rights import subject
@@ -47,7 +47,7 @@ def main(argv: Sequence[str]) -> int:
     if folder.exists():
         raise UserError(f"--out {options.out}: exists already; remove it or choose another folder")
     try_folder(folder, "--out")
-    folder.chmod(0o700)
+    make_folder(folder, 0o700)
     try:
         make(folder, list(dict.fromkeys(options.worlds.split(","))), options.host, options.listen, options.port)
     except OSError as error:

@@ -1,23 +1,43 @@
 """The folder of a run."""
 
+import shutil
 from contextlib import suppress
 from pathlib import Path
 
-from phototaxis.disk import try_folder
+from phototaxis.disk import make_folder, try_folder, unwritten
 from phototaxis.messages import run_name
 
 
-def run_folder(out: Path) -> Path:
-    """Make a folder in `out` that is called as its run; of runs that start at the same moment each has its own.
+class RunFolder:
+    """A fresh folder in `out` that is called as its run; of runs that start at the same moment each has its own.
 
     Raises
     ------
     UserError, Unavailable
         when it cannot be made, or the disk is full.
     """
-    try_folder(out.resolve(), "--out")
-    while True:
-        folder = out.resolve() / run_name()
-        with suppress(FileExistsError):
-            folder.mkdir()
-            return folder
+
+    def __init__(self, out: Path):
+        out = out.resolve()
+        try_folder(out, "--out")
+        self._made = [part for part in (out, *out.parents) if not part.exists()]
+        make_folder(out)
+        self.path = self._fresh(out)
+
+    def remove(self) -> None:
+        """Take the folder away with all that is in it, and what had to be made for it where nothing else is in it."""
+        shutil.rmtree(self.path, ignore_errors=True)
+        with suppress(OSError):
+            for part in self._made:
+                part.rmdir()
+
+    def _fresh(self, out: Path) -> Path:
+        while True:
+            folder = out / run_name()
+            try:
+                folder.mkdir()
+                return folder
+            except FileExistsError:
+                continue
+            except OSError as error:
+                raise unwritten(folder, error) from None

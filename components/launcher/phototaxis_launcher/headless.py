@@ -5,9 +5,11 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from phototaxis.disk import write_whole
 from phototaxis.errors import ComponentFailed
 from phototaxis.ports import free_ports
 from phototaxis.viewer import rerun_program
@@ -72,7 +74,9 @@ def picture(source: str, target: Path, seconds: float) -> None:
     with viewer(source) as client, tempfile.TemporaryDirectory() as folder:
         time.sleep(seconds)  # the moment that is wanted
         if target.suffix == ".png":
-            client.save_screenshot(str(target.resolve()))
+            file = Path(folder) / "picture.png"
+            client.save_screenshot(str(file))
+            write_whole(target, file.read_bytes())
             return
         frames = []
         for number in range(round(seconds * FRAMES_A_SECOND)):
@@ -83,4 +87,7 @@ def picture(source: str, target: Path, seconds: float) -> None:
                 height = round(image.height * ANIMATION_WIDTH / image.width)
                 frames.append(image.convert("RGB").resize((ANIMATION_WIDTH, height)).quantize(96))
             time.sleep(max(began + 1 / FRAMES_A_SECOND - time.monotonic(), 0))  # until the next frame
-        frames[0].save(target, save_all=True, append_images=frames[1:], duration=1000 // FRAMES_A_SECOND, loop=0)
+        film = BytesIO()
+        duration = 1000 // FRAMES_A_SECOND
+        frames[0].save(film, "GIF", save_all=True, append_images=frames[1:], duration=duration, loop=0)
+        write_whole(target, film.getvalue())

@@ -2,12 +2,11 @@
 
 import json
 import re
-import shutil
 import signal
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +22,7 @@ from phototaxis.ports import find_ports
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
 
-from phototaxis_launcher.folder import run_folder
+from phototaxis_launcher.folder import RunFolder
 from phototaxis_launcher.processes import Child
 from phototaxis_launcher.progress import Progress
 
@@ -75,7 +74,10 @@ class Run:
         self._complained = False
         self._drove: set[str] = set()
         swaps = swap_plan(options.swap)
-        self.folder = run_folder(Path(options.out))
+        wanted = {"--grpc-port": options.grpc_port, "--web-port": options.web_port}
+        ports = [] if options.no_recorder else find_ports("127.0.0.1", wanted)
+        self._place = RunFolder(Path(options.out))
+        self.folder = self._place.path
         self.name = self.folder.name
         self._begun = False
         self._lost: UserError | None = None
@@ -100,9 +102,8 @@ class Run:
         }  # fmt: skip
         for tick, learner in swaps:
             self._agent(successor(agent_words, ["--learner", learner]), "--take-over", f"--at={tick}")
-        if not options.no_recorder:
-            wanted = {"--grpc-port": options.grpc_port, "--web-port": options.web_port}
-            grpc, web = find_ports("127.0.0.1", wanted)
+        if ports:
+            grpc, web = ports
             self.children["recorder"] = self._child(
                 "recorder", *bus, f"--output={self.recording}", f"--grpc-port={grpc}", f"--web-port={web}"
             )
@@ -167,20 +168,12 @@ class Run:
 
     @contextmanager
     def _folder_of_a_run(self) -> Iterator[None]:
-        """Make the run's folder; a run that the user's input or a missing peer kept from beginning leaves none."""
-        made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
-        try:
-            self.folder.mkdir(parents=True)
-        except OSError as error:
-            raise UserError(f"--out {self._options.out}: {error.strerror}") from None
+        """A run that the user's input or a missing peer kept from beginning leaves no folder."""
         try:
             yield
         except UserError as error:
             if not self._begun and not isinstance(error, ComponentFailed):
-                shutil.rmtree(self.folder, ignore_errors=True)
-                with suppress(OSError):  # somebody else's files are in it by now
-                    for path in made[1:]:
-                        path.rmdir()
+                self._place.remove()
             raise
 
     def _complete(self, status: Status) -> bool:

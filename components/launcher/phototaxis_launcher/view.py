@@ -12,6 +12,7 @@ from typing import Annotated
 
 import msgspec
 from msgspec import Meta
+from phototaxis.disk import try_file
 from phototaxis.errors import ComponentFailed, Unavailable, UserError
 from phototaxis.options import parse
 from phototaxis.ports import find_ports
@@ -45,6 +46,8 @@ def main(argv: Sequence[str]) -> int:
     options = parse(Options, argv, "phototaxis view", about, positional=["run"])
     if options.picture and Path(options.picture).suffix not in (".png", ".gif"):
         raise UserError(f"--picture {options.picture}: it must end in .png or .gif")
+    if options.picture:
+        try_file(Path(options.picture), "--picture")
     web = options.web or not has_display()
     if options.run:
         with tempfile.TemporaryDirectory(prefix="phototaxis-") as folder:

@@ -74,7 +74,7 @@ class Server:
                 recording.keep()
                 flush_at = now + FLUSH_EVERY
             if recording is not None and now >= catch_up_at:
-                self._bus.put("recording", Recorded(self._run, recording.kept, recording.fault))
+                self._bus.put("recording", Recorded(self._run, recording.kept, recording.fault or recording.low))
                 behind = recording.translator.behind()
                 for topic in LOGS:
                     if topic.removeprefix("log/") in behind or now - self._heard.get(topic, 0.0) > CATCH_UP_EVERY:

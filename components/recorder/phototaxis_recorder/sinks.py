@@ -36,12 +36,13 @@ class Recording:
     ----------
     translator : takes what is to be recorded.
     fault : why the file is not written any more, or lacks its summary, in a line; "" while all is well.
+    low : that its disk is nearly full, in a line; "" while it is not.
     kept : the newest tick that is in the file; −1 for none.
     """
 
     def __init__(self, world: World, wanted: Path, host: str, grpc_port: int, memory: str):
-        self.fault, self.kept = "", -1
-        self._size, self._warned, self._stopped = 0, False, False
+        self.fault, self.low, self.kept = "", "", -1
+        self._size, self._stopped = 0, False
         sinks: list[rr.GrpcServerSink | rr.FileSink] = [rr.GrpcServerSink(host, grpc_port, server_memory_limit=memory)]
         try:
             self.file = fresh_file(wanted)
@@ -82,9 +83,9 @@ class Recording:
 
     def _mind_the_space(self) -> None:
         free = shutil.disk_usage(self.file.parent).free
-        if free < LOW and not self._warned:
-            self._warned = True
-            self._tell(f"{self.file}: only {free / 1e6:.0f} MB are left on its disk")
+        if free < LOW and not self.low:
+            self.low = f"{self.file}: less than {LOW / 1e6:.0f} MB are left on its disk"
+            self._tell(self.low)
 
     def _cause(self) -> str:
         """Why nothing more can be written to the file."""

@@ -343,8 +343,8 @@ class Server:
 
     def _warnings(self) -> list[str]:
         recorded = self._recorded
-        unrecorded = recorded.fault if recorded is not None and recorded.run == self._sim.world.run else ""
-        return [fault for fault in (self._unkept, unrecorded) if fault]
+        of_recording = recorded.warning if recorded is not None and recorded.run == self._sim.world.run else ""
+        return [fault for fault in (self._unkept, of_recording) if fault]
 
     def _announce(self, now: float) -> None:
         if now - self._rate_at >= 1.0:
