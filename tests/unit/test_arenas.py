@@ -1,6 +1,7 @@
 """Arenas: the shipped ones are worlds, a wrong file gets one line that names the key."""
 
 import math
+from codecs import BOM_UTF8
 
 import numpy as np
 import pytest
@@ -59,6 +60,12 @@ def test_a_robot_that_fits_nowhere_is_told():
     arena = arenas.parse(HEAD + LIGHT + "[robot]\nlength = 11.0\nwidth = 11.0\n", "t.toml")
     with pytest.raises(UserError, match="fits nowhere"):
         Physics(arena).random_pose(np.random.default_rng(0))
+
+
+def test_a_file_with_a_byte_order_mark_is_an_arena(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_bytes(BOM_UTF8 + (HEAD + LIGHT).encode())
+    assert arenas.load(str(file)).name == "t"
 
 
 def test_an_unknown_name_lists_what_there_is():
