@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from phototaxis_agent.learner import available
+from making import own_learners
 from support import children, observer, phototaxis, result, wait_status
 
 EPOCHS = 3000
@@ -89,7 +89,7 @@ def test_lost_and_doubled_messages_change_nothing(start, alone, world, tmp_path)
     assert {"state_hash": status.hash, "learner_hash": load(checkpoint)[0].learner_hash} == alone
 
 
-@pytest.mark.parametrize("learner", [name for name in available() if name != "qtable"])
+@pytest.mark.parametrize("learner", [name for name in own_learners() if name != "qtable"])
 def test_every_learner_learns_the_same_over_the_bus(up, learner):
     percept = "continuous" if learner == "dqn" else "rich" if learner == "mirror" else "simple"
     words = ("--learner", learner, "--percept", percept, "--epochs", 500, "--seed", 5)

@@ -23,6 +23,13 @@ PORT = "an endpoint is like tcp/127.0.0.1:7447"
         ("up --seed -1", "--seed -1: expected a whole number of at least 0"),
         ("up --web-port -2", "--web-port -2: expected a whole number of at least -1"),
         ("up --epochs 10 --out garbage", "--out garbage: "),
+        (
+            "up --epochs 10 --arena papr",
+            "sim: no arena 'papr': neither a file nor one that is shipped; did you mean paper?",
+        ),
+        ("up --learner mirror --alpha 0.1", "no option --alpha (see phototaxis agent --learner mirror --help)"),
+        ("demo --lerner mirror", "no option --lerner; did you mean --learner?"),
+        ("agent --lerner mirror", "no option --lerner; did you mean --learner?"),
         ("train --seed -1", "--seed -1: expected a whole number of at least 0"),
         ("train --seed 99999999999999999999", "--seed 99999999999999999999: expected a whole number of at most"),
         ("train --checkpoint nowhere/c.npz", "there is no folder nowhere"),
@@ -40,8 +47,9 @@ PORT = "an endpoint is like tcp/127.0.0.1:7447"
         ("fmu info binary", "binary: not an FMU"),
         ("view nothing", "no recording of a run 'nothing'"),
         ("status --connect nowhere", PORT),
-        ("status --name a/b", "--name a/b: "),
+        ("status --name a/b", "--name a/b: expected letters, digits, '.', '_' and '-', as in phototaxis"),
         ("status --zenoh-config garbage", "garbage: not a Zenoh configuration"),
+        ("control resum", "VERB resum: no such verb; did you mean resume? there are: pause, resume"),
         ("control juggle", "no such verb; there are: pause, resume"),
         ("control begin --seed -1", "--seed -1: expected a whole number of at least 0"),
         ("health juggler", "no such role; there are: router, sim"),
@@ -56,8 +64,17 @@ def test_a_mistake_is_one_line(tmp_path, monkeypatch, words, line):
         (tmp_path / name).write_text("garbage")
     (tmp_path / "binary").write_bytes(bytes(range(128, 256)))
     monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
     done = phototaxis(*words.split())
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("phototaxis: error: ")
     assert done.stderr.count("\n") == 1
     assert line in done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_run_that_never_began_leaves_no_folder(up, tmp_path):
+    launcher = up("--light-fmu", "nothing.fmu")
+    assert launcher.end() == 2
+    assert launcher.stderr.splitlines()[-1] == "phototaxis: error: sensors: nothing.fmu: there is no such file"
+    assert not (tmp_path / "runs").exists()

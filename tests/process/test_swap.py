@@ -129,6 +129,24 @@ def test_a_standby_goes_on_where_a_killed_driver_was(team, tmp_path):
     bus, driver, standby, others = team
     driver.kill()
     assert finish(bus, standby, others, tmp_path) == alone("--epochs", EPOCHS, "--seed", 7)
+    assert "heir: agent of the world '" in standby.stderr
+    assert "waits for a simulation and its sensors" in standby.stderr
+    assert "heir: stands by; driver drives at tick" in standby.stderr
+    assert "heir: drives from tick" in standby.stderr
+    assert "is finished, at tick" in others[0].stderr
+
+
+def test_a_component_alone_says_what_becomes_of_it(start, world):
+    sim, sensors = start("sim", "--name", world), start("sensors", "--name", world)
+    with observer(world) as bus:
+        driver = start("agent", "--name", world, "--ident", "driver")
+        status = wait_status(bus, lambda status: status.driver == "driver", sim, sensors, driver)
+        third = start("agent", "--name", world, "--ident", "third")
+        line = "third: waits until driver leaves the seat; --take-over takes it, --standby inherits it"
+        wait_status(bus, lambda _: line in third.stderr, sim, sensors, driver, third)
+    assert f"senses in the run {status.run}" in sensors.stderr
+    assert f"sim of the world '{world}', on this machine; waits for sensors and an agent" in sim.stderr
+    assert f"sim: driver drives in the run {status.run}, from tick 0 on" in sim.stderr
 
 
 def test_a_frozen_driver_loses_the_seat_and_its_late_command_does_not_count(team, tmp_path):

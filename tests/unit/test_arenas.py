@@ -1,6 +1,7 @@
 """Arenas: the shipped ones are worlds, a wrong file gets one line that names the key."""
 
 import math
+from codecs import BOM_UTF8
 from importlib import resources
 
 import msgspec
@@ -194,6 +195,12 @@ def test_a_digest_is_of_the_world_and_not_of_its_name(paper):
     assert renamed.digest == paper.digest
     for other in ({"size": (10.0, 10.5)}, {"placement": Placement(2.0)}, {"sensing": Sensing(noise=0.1)}):
         assert msgspec.structs.replace(paper, **other).digest != paper.digest
+
+
+def test_a_file_with_a_byte_order_mark_is_an_arena(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_bytes(BOM_UTF8 + (HEAD + LIGHT).encode())
+    assert arenas.load(str(file)).name == "t"
 
 
 def test_an_unknown_name_lists_what_there_is():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from making import own_learners
 from phototaxis.arena import Arena
 from phototaxis.checkpoint import learner_hash, load, save
 from phototaxis.errors import UserError
@@ -10,7 +11,7 @@ from phototaxis.messages import World
 from phototaxis.task import ACTIONS, MIRRORED, PERCEPTS
 from phototaxis_agent import context
 from phototaxis_agent.inputs import OneHot, Scaled
-from phototaxis_agent.learner import Learner, Transition, available, find
+from phototaxis_agent.learner import Learner, Transition, find
 from phototaxis_agent.perceptron import Hyperparameters, Perceptron
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab.loop import Loop
@@ -26,7 +27,7 @@ def make(name: str, percept: str, **options) -> Learner:
 
 
 def test_these_are_the_names():
-    assert set(available()) == set(TABLES + NETS)
+    assert set(own_learners()) == set(TABLES + NETS)
 
 
 @pytest.mark.parametrize(("name", "percept"), EVERY)

@@ -32,17 +32,17 @@ def together(work):
 def test_runs_that_have_the_same_name_have_two_folders(tmp_path, monkeypatch):
     names = iter(["one", "one", "two"])
     monkeypatch.setattr(folder, "run_name", lambda: next(names))
-    assert [folder.run_folder(tmp_path / "runs").name for _ in range(2)] == ["one", "two"]
+    assert [folder.RunFolder(tmp_path / "runs").path.name for _ in range(2)] == ["one", "two"]
 
 
 def test_runs_that_start_together_have_folders_of_their_own(tmp_path):
-    assert len(set(together(lambda _: folder.run_folder(tmp_path / "runs")))) == MANY
+    assert len(set(together(lambda _: folder.RunFolder(tmp_path / "runs")))) == MANY
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(UserError, match=r"--out .*/file: Not a directory"):
-        folder.run_folder(tmp_path / "file")
+        folder.RunFolder(tmp_path / "file")
 
 
 def test_recorders_that_start_together_have_files_of_their_own(tmp_path):

@@ -26,10 +26,9 @@ def prepare() -> None:
         os.set_inheritable(number, True)
     os.close(number)
     for number, name in enumerate(("stdin", "stdout", "stderr")):
-        stream = getattr(sys, name)
-        if stream is None:
+        if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, "w" if number else "r"))
-        elif number and isinstance(stream, io.TextIOWrapper):
+        if number and isinstance(stream := getattr(sys, name), io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     if isinstance(sys.stderr, io.TextIOWrapper) and sys.stderr is sys.__stderr__:  # not one of a test or a notebook
         file = io.BufferedWriter(_Dropping(sys.stderr.fileno(), "w", closefd=False))

@@ -58,7 +58,7 @@ def _rights(options: Options) -> int:
         _put(file, text(config, "phototaxis check rights --write"))
         return 0
     print(rights.table())
-    if not file.exists():
+    if not file.is_file():
         raise UserError(f"{file}: no such file; write it with: phototaxis check rights --write --file {file}")
     try:
         found = zenoh.Config.from_file(str(file))
@@ -88,7 +88,7 @@ def _wire(options: Options) -> int:
     file = Path(options.file or WIRE)
     if options.write:
         _put(file, wire.page())
-    elif not file.exists() or file.read_bytes() != wire.page().encode():
+    elif not file.is_file() or file.read_bytes() != wire.page().encode():
         raise UserError(f"{file}: not up to date; write it anew with: phototaxis check wire --write")
     else:
         print(f"{file} is up to date", file=sys.stderr)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from phototaxis.errors import UserError
 
 from phototaxis_lab.cell import Cell, Outcome, System
 from phototaxis_lab.parallel import cluster, outcomes
@@ -30,10 +29,6 @@ def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
 
 def watched(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int, Outcome]]:
     """`parallel.outcomes`, while the progress in epochs is shown."""
-    if running.backend == "dask" and not running.scheduler:
-        raise UserError("--backend dask needs the address of a scheduler: --scheduler tcp://HOST:8786")
-    if running.jobs == 0:
-        raise UserError("--jobs 0: at least one process is needed, or -1 for one on each core")
     if cells:
         print(f"agents that learn and are measured: {len(cells)}", file=sys.stderr, flush=True)
     progress = Progress(sum(cell.epochs for cell in cells), "epochs")

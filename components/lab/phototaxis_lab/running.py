@@ -20,6 +20,12 @@ class Running(Struct, kw_only=True):
     scheduler: str = ""
     """address of the Dask scheduler, as in tcp://HOST:8786; trust it: Dask's messages can run code"""
 
+    def __post_init__(self) -> None:
+        if self.backend == "dask" and not self.scheduler:
+            raise ValueError("--backend dask needs the address of a scheduler: --scheduler tcp://HOST:8786")
+        if self.jobs == 0:
+            raise ValueError("--jobs 0: at least one process is needed, or -1 for one on each core")
+
 
 def seed_range(text: str) -> range:
     """The seeds A to B − 1 of A:B; UserError when there are none."""

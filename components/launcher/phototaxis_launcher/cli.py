@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from phototaxis import __version__
 from phototaxis.errors import UserError, leave, one_line
+from phototaxis.words import known
 
 
 class Verb(NamedTuple):
@@ -62,7 +63,7 @@ def dispatch(words: list[str]) -> int:
         return 0
     verb = VERBS.get(words[0])
     if verb is None:
-        raise UserError(f"no command '{words[0]}'; there are: {', '.join(VERBS)}")
+        raise UserError(f"no command '{words[0]}'; {known(words[0], VERBS)}")
     module, _, function = verb.target.partition(":")
     try:
         command: Callable[[list[str]], int | None] = getattr(import_module(module), function)

@@ -10,6 +10,7 @@ from msgspec import Meta, Struct
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.options import parse
+from phototaxis.words import known
 
 
 class Info(Struct, kw_only=True):
@@ -69,7 +70,7 @@ def main(argv: Sequence[str]) -> int:
     if not argv or argv[0] not in verbs:
         text = "usage: phototaxis fmu info FILE | check FILE | build NAME   (each has --help)"
         if argv and argv[0] not in ("-h", "--help"):
-            raise UserError(f"no command 'fmu {argv[0]}'; there are: {', '.join(verbs)}")
+            raise UserError(f"no command 'fmu {argv[0]}'; {known(argv[0], verbs)}")
         print(text)
         return 0
     return verbs[argv[0]](argv[1:])
@@ -145,7 +146,7 @@ def make(argv: Sequence[str]) -> int:
     from phototaxis_sensors.fmu.examples import EXAMPLES
 
     if options.name not in EXAMPLES:
-        raise UserError(f"no example '{options.name}'; there are: {', '.join(EXAMPLES)}")
+        raise UserError(f"no example '{options.name}'; {known(options.name, EXAMPLES)}")
     file = Path(options.output or f"{options.name}.fmu")
     build(EXAMPLES[options.name], options.fmi, file, options.sources_only)
     print(f"{file}: {EXAMPLES[options.name].about}, FMI {options.fmi}.0")
