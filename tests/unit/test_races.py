@@ -36,7 +36,7 @@ def test_runs_that_have_the_same_name_have_two_folders(tmp_path, monkeypatch):
 
 
 def test_runs_that_start_together_have_folders_of_their_own(tmp_path):
-    assert len(set(together(lambda _: folder.RunFolder(tmp_path / "runs")))) == MANY
+    assert len(set(together(lambda _: folder.RunFolder(tmp_path / "runs").path))) == MANY
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
