@@ -66,11 +66,15 @@ class Recording:
         try:
             self._stream.flush()
             size = self.file.stat().st_size
+            if size == self._size:
+                return
             write_summary(self.file, summary)
         except (RuntimeError, OSError) as error:
             self._cut(str(unwritten(self.file, error)) if isinstance(error, OSError) else self._cause())
         except Unavailable as error:  # the recording itself is well
-            self.fault = str(error)
+            if self.fault != str(error):
+                self.fault = str(error)
+                self._tell(self.fault)
         else:
             self.fault, self._size, self.kept = "", size, summary.tick
             self._mind_the_space()
