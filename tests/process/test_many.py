@@ -70,6 +70,7 @@ def test_resets_of_some_robots_behind_the_bus(system, world, tmp_path):
     options = {"num_envs": 4, "percept": "sensors", "cap": 20, "autoreset_mode": "SameStep"}
     here = gymnasium.make_vec(NAME, arena=str(tmp_path / "quiet.toml"), **options)
     there: Any = gymnasium.make_vec(NAME, connect="local", world=world, **options)
+    mask = {"reset_mask": np.array([False, True, False, True])}
     rng, ends = np.random.default_rng(0), 0
     np.testing.assert_array_equal(here.reset(seed=2**90)[0], there.reset(seed=2**90)[0])
     for step in range(60):
@@ -82,7 +83,6 @@ def test_resets_of_some_robots_behind_the_bus(system, world, tmp_path):
             np.testing.assert_allclose(one[4]["final_obs"][row], other[4]["final_obs"][row], atol=1e-4)
             assert one[4]["final_info"]["is_success"][row] == other[4]["final_info"]["is_success"][row] == one[2][row]
         if step == 30:
-            mask = {"reset_mask": np.array([False, True, False, True])}
             np.testing.assert_allclose(here.reset(options=mask)[0], there.reset(options=mask)[0], atol=1e-4)
             np.testing.assert_allclose(here.reset()[0], there.reset()[0], atol=1e-4)
     assert ends > 8
