@@ -3,18 +3,15 @@
 import json
 import subprocess
 import sys
-from contextlib import ExitStack
 
 import zenoh
-from phototaxis.bus import Bus
 from phototaxis.ports import free_ports
-from phototaxis.session import BusOptions, open_session
 
 STRANGER = """
 import sys, time, zenoh
 config = zenoh.Config()  # as Zenoh comes: it scouts, gossips and listens
 config.insert_json5("connect/endpoints", sys.argv[1])
-heard, wanted, deadline = set(), set(sys.argv[2:]), time.monotonic() + 60
+wanted, deadline = set(sys.argv[2:]), time.monotonic() + 60
 with zenoh.open(config) as session:
     print("here", flush=True)
     def worlds():
@@ -25,6 +22,21 @@ with zenoh.open(config) as session:
     print(*sorted(worlds()))
 """
 """Prints the worlds that it finds, when it has found those that it is told to find."""
+WORLDS = """
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from phototaxis.bus import Bus
+from phototaxis.session import BusOptions, open_session
+with ExitStack() as stack:
+    for file in sys.argv[1:]:
+        world = Path(file).stem
+        options = BusOptions(name=world, zenoh_config=file, insecure=world.startswith("asks-for"))
+        session = stack.enter_context(open_session("sim", options))
+        stack.enter_context(Bus(session, world, "sim", "test"))
+    sys.stdin.read()
+"""
+"""Opens a world for each file; in a process of its own, since Zenoh looks for network interfaces once in a process."""
 
 
 def test_what_a_file_leaves_out_lets_no_stranger_in(namespace, tmp_path):
@@ -52,16 +64,17 @@ def test_what_a_file_leaves_out_lets_no_stranger_in(namespace, tmp_path):
     }
     gossip = {"multicast": {"enabled": False}, "gossip": {"enabled": True}}
     between = {"listen": {"endpoints": [friend, f"tcp/{address}:{meeting}"]}, "scouting": gossip}
-    with ExitStack() as stack:
-        stack.enter_context(zenoh.open(zenoh.Config.from_json5(json.dumps(between))))
-        argv = [*enter, sys.executable, "-c", STRANGER, json.dumps([f"tcp/{address}:{meeting}"]), *opened]
-        stranger = stack.enter_context(subprocess.Popen(argv, stdout=subprocess.PIPE, text=True))
+    for world, sections in {**files, **opened}.items():
+        (tmp_path / f"{world}.json5").write_text(json.dumps(sections))
+    argv = [*enter, sys.executable, "-c", STRANGER, json.dumps([f"tcp/{address}:{meeting}"]), *opened]
+    hosting = [sys.executable, "-c", WORLDS, *(str(tmp_path / f"{world}.json5") for world in {**files, **opened})]
+    with (
+        zenoh.open(zenoh.Config.from_json5(json.dumps(between))),
+        subprocess.Popen(argv, stdout=subprocess.PIPE, text=True) as stranger,
+    ):
         assert stranger.stdout is not None
         assert stranger.stdout.readline() == "here\n"
-        for world, sections in {**files, **opened}.items():  # each scouts at once, so the last is found last
-            file = tmp_path / f"{world}.json5"
-            file.write_text(json.dumps(sections))
-            options = BusOptions(name=world, zenoh_config=str(file), insecure=world in opened)
-            session = stack.enter_context(open_session("sim", options))
-            stack.enter_context(Bus(session, world, "sim", "test"))
-        assert stranger.stdout.read().split() == sorted(opened)
+        with subprocess.Popen(hosting, stdin=subprocess.PIPE) as hosts:  # each scouts at once: the last is found last
+            found = stranger.stdout.read().split()
+            hosts.communicate()
+    assert found == sorted(opened)
