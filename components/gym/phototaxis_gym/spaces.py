@@ -10,7 +10,6 @@ from gymnasium.vector.utils import iterate
 from phototaxis.arena import Arena
 from phototaxis.task import ACTIONS, OWN_REWARD, PERCEPTS, REWARDS, Percept, Reward
 
-from phototaxis_gym import CAP
 from phototaxis_gym.errors import WrongAction, WrongCount
 
 ROUNDING = 1e-6
@@ -180,10 +179,8 @@ def valid_cap(cap: int) -> int:
     Raises
     ------
     gymnasium.error.Error
-        for fewer, or for more than Gymnasium's own limit allows.
+        for fewer.
     """
     if cap < 1:
         raise Error(f"cap {cap}: an episode has at least one step")
-    if cap > CAP:
-        raise Error(f"cap {cap}: Gymnasium cuts episodes after {CAP} steps; give max_episode_steps={cap} instead")
     return cap
