@@ -30,7 +30,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
     reward : "own" (the percept's), "difference", "static" or "potential".
     action : "discrete" (nine motor commands) or "continuous" (two wheels, −1..1).
     cap : steps after which an episode is truncated. None: only `max_episode_steps` of `gymnasium.make` truncates,
-        which is 300 unless it is given.
+        which is 300 unless it is given; so a larger cap needs it, too.
     render_mode : None, "rgb_array" or "human"; on the bus None: people watch in the Rerun viewer.
     connect : "" for a world in this process. "local" (this machine's sockets), a Zenoh endpoint as
         "tcp/HOST:7447" or a Zenoh configuration file: drive the robot of a running system.
@@ -66,7 +66,11 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         if render_mode is not None and render_mode not in modes:
             raise Error(f"no render_mode '{render_mode}'; there are: {', '.join(modes)}")
         self._reward, self.action_space = rewards(reward, valid_percept(percept)), actions(action)
-        self.cap, self.render_mode = None if cap is None else valid_cap(cap), render_mode
+        self._cap, self.render_mode = None if cap is None else valid_cap(cap), render_mode
+        if cap is not None and cap > CAP:
+            logger.warn(
+                f"cap {cap}: gymnasium.make cuts episodes after {CAP} steps; give it max_episode_steps={cap}, too"
+            )
         try:
             self._place: Place = There(connect, world, timeout) if connect else Here(arenas.enter(arena or "paper"))
         except UserError as error:
@@ -107,7 +111,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         self._steps += 1
         seen = self._look(now)
         reward = self._reward(max(self._memory.before), now, self._memory.unchanged)
-        return seen, float(reward), bool(lit(now)), self._steps >= (self.cap or np.inf), self._info(now)
+        return seen, float(reward), bool(lit(now)), self._steps >= (self._cap or np.inf), self._info(now)
 
     def render(self) -> np.ndarray | None:
         """A picture, (height, width, 3) uint8; None where it goes to a window."""
@@ -132,7 +136,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         """How the present episode ends when the next one is asked for."""
         if self._readings is not None and lit(self._readings):
             return "reached"
-        return "cap" if self._steps >= (self.cap or CAP) else "asked"
+        return "cap" if self._steps >= (self._cap or CAP) else "asked"
 
     def _look(self, readings: Readings) -> Any:
         self._memory.see(readings)
