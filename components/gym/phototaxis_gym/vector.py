@@ -35,8 +35,8 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
 
     Parameters
     ----------
-    max_episode_steps : steps after which an episode is truncated; −1 for no limit. `cap` takes the place of the usual 300, and
-        lowers any other.
+    max_episode_steps : steps after which an episode is truncated; −1 for no limit. `cap` takes the
+        place of the usual 300, and lowers any other.
     render_mode : None, "rgb_array" (`render` returns one picture for each robot) or "human" (all in one window).
     autoreset_mode : what becomes of a robot whose episode has ended. NEXT_STEP: the next step places it anew and
         ignores its action. SAME_STEP: it is placed anew at once; `info` has "final_obs" and "final_info". DISABLED:
@@ -77,9 +77,8 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
             raise Error(f"num_envs {num_envs}: at least one robot is needed")
         if max_episode_steps < 1 and max_episode_steps != -1:
             raise Error(f"max_episode_steps {max_episode_steps}: at least one step, or -1 for no limit")
-        limit = (
-            np.inf if max_episode_steps == -1 or (cap is not None and max_episode_steps == CAP) else max_episode_steps
-        )
+        usual = cap is not None and max_episode_steps == CAP
+        limit = np.inf if max_episode_steps == -1 or usual else max_episode_steps
         self.num_envs, self._cap = num_envs, limit if cap is None else min(valid_cap(cap), limit)
         self._reward, self.single_action_space = rewards(reward, valid_percept(percept)), actions(action)
         self._mode, self.render_mode = AutoresetMode(autoreset_mode), render_mode
