@@ -6,6 +6,7 @@ What goes wrong is one line that names the place and says why. A place that can 
 
 import errno
 import os
+import secrets
 from contextlib import suppress
 from pathlib import Path
 
@@ -127,9 +128,9 @@ def _special(path: Path) -> bool:
 
 
 def _beside(path: Path) -> Path:
-    """Where the new contents are written first; a link stays a link."""
+    """Where the new contents are written first, by each of several writers; a link stays a link."""
     target = Path(os.path.realpath(path))
-    return target.with_name(f"{target.name}.new")
+    return target.with_name(f"{target.name}.{secrets.token_hex(4)}.new")
 
 
 def _refused(path: Path, option: str, error: OSError) -> UserError:
