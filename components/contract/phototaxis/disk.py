@@ -128,7 +128,7 @@ def _special(path: Path) -> bool:
 
 
 def _beside(path: Path) -> Path:
-    """Where the new contents are written first, of several writers each in its own file; a link stays a link."""
+    """Where the new contents are written first, by each of several writers; a link stays a link."""
     target = Path(os.path.realpath(path))
     return target.with_name(f"{target.name}.{secrets.token_hex(4)}.new")
 
