@@ -107,7 +107,7 @@ def test_results_in_an_arena_that_was_changed_are_another_grids(tmp_path: Path):
     grid = [Cell(System("qtable", arena=str(mine)), 60, 0)]
     Results(tmp_path / "r", grid)
     Results(tmp_path / "r", grid)
-    mine.write_text(text.replace("brightness = 1.0", "brightness = 0.9"))
+    mine.write_text(text.replace("brightness = 1.0", "brightness = 1.2"))
     with pytest.raises(UserError, match=r"holds results of 'qtable .*' in another arena"):
         Results(tmp_path / "r", grid)
 

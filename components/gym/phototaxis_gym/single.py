@@ -68,9 +68,8 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         self._reward, self.action_space = rewards(reward, valid_percept(percept)), actions(action)
         self._cap, self.render_mode = None if cap is None else valid_cap(cap), render_mode
         if cap is not None and cap > CAP:
-            logger.warn(
-                f"cap {cap}: gymnasium.make cuts episodes after {CAP} steps; give it max_episode_steps={cap}, too"
-            )
+            limit = f"gymnasium.make cuts episodes after {CAP} steps; give it max_episode_steps={cap}, too"
+            logger.warn(f"cap {cap}: {limit}")
         try:
             self._place: Place = There(connect, world, timeout) if connect else Here(arenas.enter(arena or "paper"))
         except UserError as error:
