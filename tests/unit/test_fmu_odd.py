@@ -524,6 +524,9 @@ def test_an_invalid_description_is_used_on_request(fmu: Built, tmp_path: Path, s
     )
     with pytest.raises(UserError, match="cannot be used"):
         sensors(light_fmu=str(broken), allow_invalid=True)
+    words = described(fmu("lag", 2), tmp_path / "c.fmu", 'min="0.0"', 'min="nought"')
+    with pytest.raises(UserError, match="cannot be used: could not convert string to float: 'nought'"):
+        sensors(light_fmu=str(words), allow_invalid=True)
 
 
 def test_the_true_cause_of_a_file_that_cannot_be_used(fmu: Built, tmp_path: Path):
