@@ -292,3 +292,43 @@ def test_an_fmu_in_python(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "light: 400 ticks in 8 episodes" in done.stdout
     assert "not as the standard has it: ModelStructure/InitialUnknowns" in done.stderr
+
+
+def test_what_an_fmu_in_python_raises_is_told(tmp_path):
+    (tmp_path / "blind.py").write_text(
+        """from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+class Blind(Fmi2Slave):
+    def __init__(self, **more):
+        super().__init__(**more)
+        self.u = self.y = 0.0
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+    def do_step(self, now, step):
+        raise ValueError("the calibration table is empty")
+"""
+    )
+    build = [sys.executable, "-m", "pythonfmu", "build", "-f", tmp_path / "blind.py", "-d", tmp_path]
+    subprocess.run(build, capture_output=True, check=True)
+    refused(
+        "ValueError('the calibration table is empty')",
+        "fmu",
+        "check",
+        tmp_path / "Blind.fmu",
+        "--kind",
+        "light",
+        code=4,
+    )
+    trained = phototaxis("train", "--epochs", 10, "--light-fmu", tmp_path / "Blind.fmu")
+    assert trained.returncode == 4
+    assert "ValueError('the calibration table is empty')" in trained.stderr.splitlines()[-1]
+
+
+def test_a_run_with_an_fmu_that_cannot_be_reset_is_the_same_run(fmu: Built, up, tmp_path):
+    old = "fmi2Status fmi2Reset(fmi2Component c) { return begin(c), fmi2OK; }"
+    broken = altered(
+        tmp_path / "lag2.fmu", "lag", 2, {old: "fmi2Status fmi2Reset(fmi2Component c) { return fmi2Error; }"}
+    )
+    words = "--epochs", 600, "--seed", 7, "--no-recorder"
+    good, odd = (result(up(*words, "--light-fmu", file)) for file in (fmu("lag", 2), broken))
+    assert (odd["state_hash"], odd["learner_hash"]) == (good["state_hash"], good["learner_hash"])
+    assert not odd["restarts"]

@@ -182,13 +182,12 @@ def test_which_steps_an_fmu_gets(fmu: Built, tmp_path: Path, interface, step, pe
 # -- limits
 
 
-@VERSIONS
 @pytest.mark.parametrize(
     ("value", "expected"),
     [("-1e-17", 0.0), ("5.0000000000000009", 5.0), ("5.000001", 5.0), ("-1e-7", 0.0), ("5.1", None), ("-0.1", None)],
 )
-def test_rounding_beyond_a_limit_is_put_back(paper: Arena, sensors, tmp_path: Path, version, value, expected):
-    odd = altered(tmp_path / "odd.fmu", "faulty", version, {"y = 7;": f"y = {value};"})
+def test_rounding_beyond_a_limit_is_put_back(paper: Arena, sensors, tmp_path: Path, value, expected):
+    odd = altered(tmp_path / "odd.fmu", "faulty", 3, {"y = 7;": f"y = {value};"})
     words = {"fmu_param": ["fault=4", "at=1"], "fmu_map": ["reading=y"], "fmu_fallback": True}
     make = sensors(sonar_fmu=str(odd), **words)
     model = make(paper, Scene(paper)).sonar
@@ -253,6 +252,14 @@ def test_logging_is_on_by_request_and_after_a_failure(paper: Arena, sensors, tmp
     assert lines[1].endswith("logs warning: verbose")
     readings(sensors(light_fmu=str(odd), fmu_log=True), paper, drive(1))
     assert "logs warning: verbose" in capsys.readouterr().err
+
+
+@VERSIONS
+def test_why_it_cannot_be_instantiated_is_told_though_it_logs_only_on_request(sensors, tmp_path: Path, version):
+    said = "if (logging) " + (SAYS[version] % ("Error", '"no license"')).removeprefix("if (m) begin(m); ")
+    odd = altered(tmp_path / "odd.fmu", "lag", version, {"if (m) begin(m);": f"{said} return NULL;"})
+    with pytest.raises(UserError, match=r"odd.fmu: cannot be instantiated \(no license\)"):
+        sensors(light_fmu=str(odd)).try_out()
 
 
 def test_what_an_fmu_says_is_bounded(paper: Arena, sensors, tmp_path: Path, capsys):
@@ -524,6 +531,9 @@ def test_an_invalid_description_is_used_on_request(fmu: Built, tmp_path: Path, s
     )
     with pytest.raises(UserError, match="cannot be used"):
         sensors(light_fmu=str(broken), allow_invalid=True)
+    words = described(fmu("lag", 2), tmp_path / "c.fmu", 'min="0.0"', 'min="nought"')
+    with pytest.raises(UserError, match="cannot be used: could not convert string to float: 'nought'"):
+        sensors(light_fmu=str(words), allow_invalid=True)
 
 
 def test_the_true_cause_of_a_file_that_cannot_be_used(fmu: Built, tmp_path: Path):

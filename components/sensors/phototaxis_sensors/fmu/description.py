@@ -139,11 +139,22 @@ def _describe(path: str, allow_invalid: bool) -> ModelDescription:
             if not allow_invalid:
                 raise UserError(f"{line}; --allow-invalid uses it all the same") from None
             print(f"sensors: {line}; it is used all the same", file=sys.stderr, flush=True)
-            return read_model_description(path, validate=False)
+            return _sound(read_model_description(path, validate=False))
     except UserError:
         raise
     except Exception as error:  # fmpy raises bare ones
         raise UserError(f"{path}: its modelDescription.xml cannot be used: {' '.join(str(error).split())}") from None
+
+
+def _sound(description: ModelDescription) -> ModelDescription:
+    """A description that no schema has approved; raises ValueError where what is used of it is no number."""
+    experiment = description.defaultExperiment
+    numbers = [experiment.stepSize] if experiment is not None else []
+    for one in (*description.modelVariables, *description.typeDefinitions):
+        numbers += [one.min, one.max]
+    for number in numbers:
+        float(number or 0)
+    return description
 
 
 def require_library(fmu: Fmu, allow_compile: bool) -> None:

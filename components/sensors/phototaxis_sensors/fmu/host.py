@@ -46,6 +46,10 @@ class Failed(Exception):
     """The FMU crashed, hung, or said that it cannot go on."""
 
 
+class Killed(Failed):
+    """Somebody else has ended its process."""
+
+
 class Terms(NamedTuple):
     """What is the same for all processes of an FMU."""
 
@@ -137,9 +141,9 @@ class Host:
             return
         try:
             self._begin(inputs)
+        except Killed:
+            raise
         except Failed as why:
-            if "SIGKILL" in str(why):  # somebody else's doing
-                raise
             self.start()
             self._begin(inputs)
             self._cannot_be_reset(str(why), "a fresh process")
@@ -221,14 +225,14 @@ class Host:
         while True:
             if not self._poll.poll(min(left, LOOK) * 1000):
                 if not self._alive():
-                    raise Failed(self._died())
+                    raise self._died()
                 left -= LOOK
                 if left <= 0:
                     raise Failed(self._end(f"gave no answer within {timeout:g} s and was ended"))
                 continue
             got = os.read(self._from, 65536)
             if not got:
-                raise Failed(self._died())
+                raise self._died()
             answer += got
             while len(answer) >= HEAD.size:
                 kind, length = HEAD.unpack_from(answer)
@@ -246,13 +250,13 @@ class Host:
     def _alive(self) -> bool:
         return self._process is not None and self._process.poll() is None
 
-    def _died(self) -> str:
+    def _died(self) -> Failed:
         try:
             code = self._process.wait(LOOK) if self._process is not None else 0
         except subprocess.TimeoutExpired:
-            return self._end("closed the pipes to its parent and was ended")
+            return Failed(self._end("closed the pipes to its parent and was ended"))
         how = f"crashed with {signal.Signals(-code).name}" if code < 0 else f"ended its process with code {code}"
-        return self._end(how)
+        return (Killed if code == -signal.SIGKILL else Failed)(self._end(how))
 
     def _end(self, why: str) -> str:
         """End a process that failed; why it did, and what it said last."""

@@ -253,7 +253,11 @@ class Instance:
         except FMICallException:
             raise
         except Exception:  # fmpy raises bare ones
-            raise Broken("cannot be instantiated") from None
+            if self._setup.logging or self._voice.reason:
+                raise Broken("cannot be instantiated") from None
+            self._setup.logging = True  # once more, to hear why
+            self._instantiate()
+            return
         if self._setup.logging:
             with suppress(FMICallException):
                 self._fmu.setDebugLogging(True, [])  # of every category; to name them would leave out what has none

@@ -3,6 +3,7 @@
 import os
 import sys
 import threading
+from contextlib import suppress
 from typing import IO
 
 SHOWN, SHOWN_ON_REQUEST = 20, 1000
@@ -97,4 +98,5 @@ class Listener:
             kind, line = STATUS[min(line[1] - ord("0"), len(STATUS) - 1)], line[2:]
         if text := one_line(line):
             self.last = text
-            self._log.heard(f"logs {kind}: {text}" if kind else f"prints: {text}")
+            with suppress(OSError, ValueError):  # nobody reads what is shown: the FMU goes on all the same
+                self._log.heard(f"logs {kind}: {text}" if kind else f"prints: {text}")

@@ -119,9 +119,8 @@ def dry_run(sensors: FmuSensors, kind: str) -> dict[str, Any]:
             twice.append([list(model(Past(at * EPISODE + i, at, *way))) for i, way in enumerate(ways)])
             spent += time.perf_counter() - began
         if twice[0] != twice[1]:
-            raise UserError(
-                f"after {sensors.begins} the same inputs give other readings: runs with this FMU cannot be repeated"
-            )
+            line = f"after {sensors.begins} the same inputs give other readings: runs with this FMU cannot be repeated"
+            raise UserError(line + (" (unless --fmu-fresh mends it)" if sensors.begins == "a reset" else ""))
         readings += [value for one in twice[0] for value in one]
     ticks = 2 * EPISODE * EPISODES
     low, high = min(readings), max(readings)

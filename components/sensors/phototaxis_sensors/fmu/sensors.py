@@ -36,17 +36,13 @@ class Wired(NamedTuple):
     wiring: Wiring
     archive: bytes | None
     """The FMU with a library that was compiled for it; None where it brought one."""
-
-    @property
-    def label(self) -> str:
-        return f"{self.kind} FMU {self.fmu.name}"
+    log: Log
 
 
 class FmuSensors:
     """Makes the models of a suite: FMUs where the options name one, else the built-in ones.
 
-    With `one_cpu` the thread that uses them stays on one CPU, with the FMUs; with `logging` the first that they log
-    is shown.
+    With `one_cpu` the thread that uses them stays on one CPU, with the FMUs; with `logging` their logging is on.
 
     Raises
     ------
@@ -57,7 +53,7 @@ class FmuSensors:
     remembers = True
 
     def __init__(self, options: FmuOptions, one_cpu: bool = False, logging: bool = False):
-        self._options, self._one_cpu, self._logging = options, one_cpu, logging
+        self._options, self._one_cpu = options, one_cpu
         files = {"light": options.light_fmu, "sonar": options.sonar_fmu}
         fmus = {kind: read(file, options.allow_invalid) for kind, file in files.items() if file}
         names, parameters = assign(options.fmu_map, options.fmu_param, fmus)
@@ -65,7 +61,9 @@ class FmuSensors:
         for kind, fmu in fmus.items():
             wiring = connect(fmu, SUITES[kind], names[kind], parameters[kind])
             require_library(fmu, options.allow_compile)
-            self._wired[kind] = Wired(kind, fmu, wiring, None if fmu.compiled else compiled(fmu.file))
+            most = SHOWN_ON_REQUEST if options.fmu_log else SHOWN
+            log = Log(f"{kind} FMU {fmu.name}", options.fmu_log or logging, most)
+            self._wired[kind] = Wired(kind, fmu, wiring, None if fmu.compiled else compiled(fmu.file), log)
         self._running: list[Host | Team] = []
 
     def try_out(self) -> None:
@@ -118,11 +116,10 @@ class FmuSensors:
                 f"{wired.fmu.file}: a process can have it once, and {instances} instances are needed; "
                 f"at most {PROCESSES} processes are started (with evaluate: fewer --placements)"
             )
-        log = Log(wired.label, options.fmu_log or self._logging, SHOWN_ON_REQUEST if options.fmu_log else SHOWN)
         found = pace(wired.fmu.description, period, options.fmu_step)
         if found.remark and not quiet:
-            log.tell(found.remark)
-        terms = Terms(wired.fmu, wired.wiring, found, log, options.fmu_timeout, options.fmu_fresh, wired.archive)
+            wired.log.tell(found.remark)
+        terms = Terms(wired.fmu, wired.wiring, found, wired.log, options.fmu_timeout, options.fmu_fresh, wired.archive)
         if wired.fmu.once and instances > 1:
             host = Team([Host(terms, 1) for _ in range(instances)])
         else:
@@ -141,4 +138,4 @@ class FmuSensors:
         return FmuModel(self._stepped(host, wired, period), rig, builtin, wired.fmu.name)
 
     def _stepped(self, host: Host | Team, wired: Wired, in_time: float = math.inf) -> Stepped:
-        return Stepped(host, wired.wiring, in_time, wired.label, self._options.fmu_fallback)
+        return Stepped(host, wired.wiring, in_time, wired.log.label, self._options.fmu_fallback)
