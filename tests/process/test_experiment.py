@@ -62,6 +62,7 @@ def test_a_cluster_that_cannot_be_reached_is_one_line(tmp_path: Path, address):
     assert re.fullmatch(
         rf"phototaxis: error: --scheduler {address}: no Dask scheduler answers there: .*", done.stderr[:-1]
     )
+    assert not (tmp_path / "r").exists()
 
 
 def test_one_seed_after_another_or_together(whole):

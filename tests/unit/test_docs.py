@@ -121,6 +121,14 @@ def test_an_example_that_lacks_something_says_so_in_one_line(script: Path, tmp_p
         assert done.stderr.count("\n") == 1
 
 
+def test_the_foreign_agent_says_which_router_it_lacks(tmp_path: Path):
+    words = [sys.executable, ROOT / "examples" / "foreign_agent.py", "tcp/127.0.0.1:9"]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 1
+    line = "no router answers at tcp/127.0.0.1:9; start one with: phototaxis router --listen tcp/127.0.0.1:9\n"
+    assert done.stderr == line
+
+
 def test_the_learner_of_the_page_plugs_in_and_learns(tmp_path: Path, monkeypatch, capsys):
     page = ROOT / "docs" / "own-learner.md"
     (tmp_path / "double_q.py").write_text(blocks(page, "python")[0], "utf-8")

@@ -106,6 +106,20 @@ def test_progress_says_what_is_left():
     assert progress.line(60.0) == "1,000 of 3,000 epochs, about 02:00 left"
 
 
+def test_progress_is_a_bar_with_an_estimate_in_any_terminal():
+    ours, theirs = os.openpty()
+    script = (
+        "import phototaxis_lab.progress as p; p.PATIENCE_S = 0\n"
+        "with p.Progress(2, 'epochs') as bar: bar.add(); bar.add()"
+    )
+    done = subprocess.run([sys.executable, "-c", script], stderr=theirs, check=False)
+    os.close(theirs)
+    shown = os.read(ours, 10_000)
+    os.close(ours)
+    assert done.returncode == 0
+    assert b"2.00/2.00 [00:00<00:00," in shown
+
+
 SAYS = "import sys; from phototaxis.errors import one_line; sys.exit(one_line(lambda: print('±, …, \\udcff') or 0))"
 
 

@@ -17,7 +17,7 @@ from phototaxis_lab.statistics import mean_interval, median_interval
 
 def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
     """The outcomes of all cells; those that the folder holds already are not computed again."""
-    with alone_in(folder):
+    with cluster(running.backend, running.scheduler), alone_in(folder):
         results = Results(folder, cells)
         missing = results.missing
         if found := len(cells) - len(missing):
@@ -28,11 +28,11 @@ def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
 
 
 def watched(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int, Outcome]]:
-    """`parallel.outcomes`, while the progress in epochs is shown."""
+    """`parallel.outcomes`, within a `cluster`, while the progress in epochs is shown."""
     if cells:
         print(f"agents that learn and are measured: {len(cells)}", file=sys.stderr, flush=True)
     progress = Progress(sum(cell.epochs for cell in cells), "epochs")
-    with cluster(running.backend, running.scheduler), progress:
+    with progress:
         for index, outcome in outcomes(cells, running.jobs):
             yield index, outcome
             progress.add(cells[index].epochs)

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from shutil import get_terminal_size
 
 from tqdm import tqdm
 
@@ -23,8 +24,10 @@ class Progress:
         self._total, self._unit, self._done = total, unit, 0
         self._began = time.monotonic()
         self._speak_at = self._began + LINE_EVERY_S
-        shown = total > 0 and sys.stderr.isatty()
-        self._bar = tqdm(total=total, unit=f" {unit}", unit_scale=True, delay=PATIENCE_S) if shown else None
+        self._bar = None
+        if total > 0 and sys.stderr.isatty():
+            width, height = get_terminal_size()  # 80 × 24 for terminals that say 0 × 0, where tqdm shows nothing
+            self._bar = tqdm(total=total, unit=f" {unit}", unit_scale=True, delay=PATIENCE_S, ncols=width, nrows=height)
 
     def __enter__(self) -> "Progress":
         return self

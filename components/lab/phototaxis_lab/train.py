@@ -102,10 +102,12 @@ def many(options: Options, setup: Any) -> dict[str, Any]:
     """Many seeds: the success of each, and what they come to."""
     from phototaxis_lab.cell import Cell, System
     from phototaxis_lab.grid import summary, watched
+    from phototaxis_lab.parallel import cluster
 
     system = System.of(setup, options.arena)
     cells = [Cell(system, options.epochs, seed) for seed in seed_range(options.seeds)]
-    outcomes = [outcome for _, outcome in sorted(watched(cells, options))]
+    with cluster(options.backend, options.scheduler):
+        outcomes = [outcome for _, outcome in sorted(watched(cells, options))]
     fields = "seed", "success_rate", "within_100", "steps_mean", "path_ratio", "learner_hash"
     seeds = [{field: getattr(outcome, field) for field in fields} for outcome in outcomes]
     found = {"learner": system.learner, "epochs": options.epochs, "seeds": seeds, **summary(outcomes)}
