@@ -1,20 +1,23 @@
 """`phototaxis up`: the processes of a run, brought up, watched and ended together."""
 
 import json
+import os
 import re
+import shlex
+import shutil
 import signal
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from msgspec import Meta
 from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
-from phototaxis.errors import ComponentFailed, UserError
+from phototaxis.errors import INTERRUPTED, ComponentFailed, UserError
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import MOST, Count, Launch, LaunchReply, Seed, Status, run_name
+from phototaxis.messages import MOST, Control, Count, Launch, LaunchReply, Seed, Status, run_name
 from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.ports import find_ports
 from phototaxis.session import BusOptions, open_session
@@ -27,6 +30,8 @@ PORT = Annotated[int, Meta(ge=-1, le=65535)]
 PATIENCE = {"recorder": 60.0, "agent": 15.0, "sensors": 5.0, "sim": 5.0}
 """Seconds that a component gets to end; also the order in which they are ended."""
 SWAPS = re.compile(r"(?P<tick>[0-9]+):(?P<learner>[^:,\s]+)")
+ANSWERED_WITHIN = 2.0
+"""Seconds that the driver gets to answer the last tick of a run that is stopped."""
 STARTING = 60.0
 """Seconds within which all components must be on the bus."""
 
@@ -59,6 +64,17 @@ class UpOptions(BusOptions, kw_only=True):
     """print the result as one JSON object, last on standard output"""
 
 
+class Show:
+    """What happens for those who watch a run: by default nothing."""
+
+    def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
+        """A status has come."""
+
+    def finished(self, run: "Run", status: Status) -> bool:
+        """The run is finished; whether everything stays up until it is stopped."""
+        return False
+
+
 class Run:
     """One run of the system."""
 
@@ -71,11 +87,12 @@ class Run:
             self.folder.mkdir(parents=True)
         except OSError as error:
             raise UserError(f"--out {options.out}: {error.strerror}") from None
-        self.checkpoint = self._checkpoint("agent")
-        """That of the agent that drove last."""
+        self.interrupted = False
+        """Whether Ctrl-C ended it."""
         self.recording = self.folder / "recording.rrd"
         self.url = ""
         self._alive: list[str] = []
+        self._announced = self.name
         bus = self._bus = _bus_flags(options)
         common = [f"--run={self.name}", f"--arena={options.arena}", f"--seed={options.seed}"]
         self.agents: list[Child] = []
@@ -121,18 +138,25 @@ class Run:
         percept = peek(self._words, "--percept", "")
         return [*([f"--percept={percept}"] if percept else []), *words]
 
-    def go(self, progress: Progress) -> Status:
+    def go(self, progress: Progress, show: Show | None = None) -> Status:
         """Start, watch until finished or stopped, end; the last status.
 
-        The agent is started when everyone else is on the bus, so that the recording has every tick.
+        The agent is started when everyone else is on the bus, so that the recording has every tick. A run that is
+        stopped is paused first: status, checkpoints and recording then end with the same tick.
         """
+        show = show or Show()
         status = Status(self.name, "waiting")
         with (
             open_session("launcher", self._options) as session,
             Bus(session, self._options.name, "launcher", f"up-{self.name}") as bus,
         ):
+
+            def end(number: int, _: object) -> None:
+                self.interrupted = self.interrupted or number == signal.SIGINT
+                bus.stop()
+
             for number in (signal.SIGTERM, signal.SIGINT):
-                signal.signal(number, lambda *_: bus.stop())
+                signal.signal(number, end)
             try:
                 for role, child in self.children.items():
                     if role != "agent":
@@ -144,6 +168,7 @@ class Run:
                     event = bus.receive(timeout=0.1)
                     self._watch(progress)
                     if event is not None and event.topic == "stop":
+                        status = _paused(bus, status)
                         break
                     if event is not None and event.topic == "launch":
                         self._launch(event, progress)
@@ -152,12 +177,29 @@ class Run:
                         progress.show(status)
                         self._report(status, progress)
                         self._confirm(status)
+                        show.follow(status, bus, progress)
                     if self.children["agent"].process is None:
                         self._start_agent(status, deadline, progress)
+                else:
+                    status = _last(bus, status) if self.children["sim"].left else status
+                    progress.close()
+                    if status.phase == "finished" and show.finished(self, status):
+                        self._linger(bus)
             finally:
-                progress.close()
-                self.stop()
+                try:
+                    progress.close()
+                finally:
+                    self.stop()
         return status
+
+    def _linger(self, bus: Bus) -> None:
+        """Keep everything up, for those who watch, until a signal or until the simulation is stopped."""
+        while not self.children["sim"].left:
+            event = bus.receive(timeout=0.1)
+            if event is not None and event.topic == "stop":
+                return
+            for child in self._all():
+                child.watch()
 
     def _complete(self, status: Status) -> bool:
         """Finished, and all are there to take part in the ending (one may just have been restarted)."""
@@ -188,9 +230,7 @@ class Run:
         progress.say(f"asked to swap: {child.name} is started")
 
     def _confirm(self, status: Status) -> None:
-        """Note whose checkpoint counts; tell those who asked for a swap that it has happened."""
-        driving = [agent for agent in self.agents if status.driver and status.driver in agent.idents]
-        self.checkpoint = self._checkpoint(driving[0].name) if driving else self.checkpoint
+        """Tell those who asked for a swap that it has happened."""
         for child, _ in list(self._pending):
             for seating in status.drivers:
                 if seating.driver in child.idents:
@@ -206,7 +246,10 @@ class Run:
         return bool(asked)
 
     def _report(self, status: Status, progress: Progress) -> None:
-        """Say who is alive, when that changes."""
+        """Say when a new run begins by request, and who is alive when that changes."""
+        if status.run != self._announced:
+            self._announced = status.run
+            progress.say(f"a new run begins, as was asked for: {status.run}")
         alive = [who.split("/")[1] for who in status.alive if not who.startswith("observer/")]
         if alive != self._alive:
             self._alive = alive
@@ -230,15 +273,22 @@ class Run:
             for child in self.agents if role == "agent" else [self.children[role]] if role in self.children else []:
                 child.stop(patience)
 
+    def checkpoint(self, status: Status) -> Path | None:
+        """That of the agent that drove last; None when it is not one of ours, or has none."""
+        last = status.drivers[-1].driver if status.drivers else ""
+        ours = [self._checkpoint(agent.name) for agent in self.agents if last in agent.idents]
+        return next((file for file in ours if file.exists()), None)
+
     def result(self, status: Status) -> dict[str, object]:
-        """What the run came to; the learner is the one that drove last."""
-        meta = load(self.checkpoint)[0] if self.checkpoint.exists() else None
+        """What the run came to; the learner is the one that drove last, if that is one of ours."""
+        checkpoint = self.checkpoint(status)
+        meta = load(checkpoint)[0] if checkpoint else None
         names = {ident: agent for agent in self.agents for ident in agent.idents}
         recordings = sorted(self.folder.glob("recording*.rrd"), key=lambda path: path.stat().st_mtime)
         return {
-            "run": self.name,
+            "run": status.run,
             "arena": self._options.arena,
-            "seed": self._options.seed,
+            "seed": self._options.seed if status.run == self.name else None,
             "learner": meta.learner if meta else None,
             "drivers": [
                 {
@@ -260,10 +310,29 @@ class Run:
             "state_hash": status.hash,
             "learner_hash": meta.learner_hash if meta else None,
             "recording": str(recordings[-1]) if recordings else None,
-            "checkpoint": str(self.checkpoint) if meta else None,
+            "checkpoint": str(checkpoint) if checkpoint else None,
             "restarts": {child.name: child.restarts for child in self._all() if child.restarts},
             "refused": status.refused,
         }
+
+
+def _paused(bus: Bus, status: Status) -> Status:
+    """The status of a run that was paused for its end, when the driver has answered its last tick."""
+    reply = bus.control(Control("pause"))
+    if reply is None:
+        return status
+    status, deadline = reply.status, time.monotonic() + ANSWERED_WITHIN
+    while status.phase == "paused" and status.waiting_for and time.monotonic() < deadline:
+        event = bus.receive(timeout=0.1)
+        status = event.message if event is not None and event.topic == "status" else status
+    return status
+
+
+def _last(bus: Bus, status: Status) -> Status:
+    """The last status of a simulation that has ended by request."""
+    while (event := bus.receive(timeout=0.2)) is not None:
+        status = event.message if event.topic == "status" else status
+    return status
 
 
 def swap_plan(text: str) -> list[tuple[int, str]]:
@@ -303,19 +372,37 @@ def main(argv: Sequence[str]) -> int:
     if options.json:
         print(json.dumps(result), flush=True)
     else:
-        summarise(result)
-    return 0
+        print(
+            f"{result['epochs']} epochs, {result['episodes']} episodes, {result['reached']} of them reached the light; "
+            f"{result['ticks_per_second']} ticks/s",
+            *places(result, status),
+            sep="\n",
+            file=sys.stderr,
+        )
+    return INTERRUPTED if run.interrupted else 0
 
 
-def summarise(result: dict[str, object]) -> None:
-    """The result for a person, on stderr."""
-    lines = [
-        f"{result['epochs']} epochs, {result['episodes']} episodes, {result['reached']} of them reached the light; "
-        f"{result['ticks_per_second']} ticks/s",
-        f"recording   {result['recording']}",
-        f"checkpoint  {result['checkpoint']}",
-    ]
-    print("\n".join(lines), file=sys.stderr)
+def places(result: dict[str, Any], status: Status) -> list[str]:
+    """Where everything of a run is, and how to look at it again, in lines for a person."""
+    lines = []
+    if recording := result["recording"]:
+        lines += [f"recording   {recording}", f"            look again: {program()} view {shown(recording)}"]
+    if checkpoint := result["checkpoint"]:
+        lines += [f"checkpoint  {checkpoint}", f"            measure it: {program()} evaluate {shown(checkpoint)}"]
+    elif status.drivers:
+        lines.append(f"checkpoint  none: {status.drivers[-1].driver} drove last, and was not started here")
+    return lines
+
+
+def program() -> str:
+    """How this program is called from here."""
+    own = Path(sys.executable).parent / "phototaxis"
+    return "phototaxis" if shutil.which("phototaxis") == str(own) or not own.exists() else shown(str(own))
+
+
+def shown(file: str) -> str:
+    """A file's path as a person at this place would type it."""
+    return shlex.quote(min(file, os.path.relpath(file), key=len))
 
 
 def _bus_flags(options: UpOptions) -> list[str]:
