@@ -23,7 +23,7 @@ SLOW = 5.0
 FIRST, LAST = 150, 300
 """Epochs at the beginning and at the end of learning that are shown slowly."""
 SEEN = f"""\
-What is to be seen: on the left the arena with its light, the robot with its sonar rays, and its trail coloured by reward;
+What is to be seen: on the left the arena with its light, the robot with its sonar rays, its trail coloured by reward;
 in the middle the share of episodes that reached the light, rewards and light; on the right what the robot has learned.
 The first and the last part are shown at {SLOW:g} × real time."""
 PLACEMENTS = 200
@@ -140,7 +140,7 @@ class Story(up.Show):
 
 
 def is_the_papers(meta: Meta, options: up.UpOptions, fmus: FmuOptions) -> bool:
-    """Whether a run was of the system for which the paper reports its 80%: Q-table, simple percept, built-in sensors."""
+    """Whether a run was of the system for which the paper reports its 80%."""
     system = (meta.learner, meta.percept, meta.arena, options.epochs, options.robots, options.swap)
     return (
         system == ("qtable", "simple", "paper", PAPERS_EPOCHS, 1, "")

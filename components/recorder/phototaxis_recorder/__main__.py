@@ -11,9 +11,10 @@ from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse
+from phototaxis.page import ViewerPage
 from phototaxis.ports import find_ports
 from phototaxis.recordings import write_summary
-from phototaxis.viewer import viewer_url
+from phototaxis.viewer import silence_rerun, viewer_url
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -33,10 +34,11 @@ class Options(ComponentOptions, kw_only=True):
 
 def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis recorder", "Record the run on the bus, live and on disk.")
+    silence_rerun()
     import rerun as rr
 
     from phototaxis_recorder.server import Server
-    from phototaxis_recorder.sinks import Page, complete, fresh_file, open_recording
+    from phototaxis_recorder.sinks import complete, fresh_file, open_recording
     from phototaxis_recorder.translate import Translator
 
     output = Path(options.output)
@@ -58,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             recording.pop().disconnect()
             complete(file)
 
-    page = Page(options.bind, web_port, grpc_port) if web_port >= 0 else None
+    page = ViewerPage(options.bind, web_port, grpc_port) if web_port >= 0 else None
     if page is not None:
         print(f"recorder: watch at {viewer_url(web_port, grpc_port)}", file=sys.stderr, flush=True)
 
