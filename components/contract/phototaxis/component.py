@@ -15,7 +15,7 @@ import msgspec
 from msgspec import Meta
 
 from phototaxis.bus import Bus
-from phototaxis.errors import one_line
+from phototaxis.errors import UserError, one_line
 from phototaxis.session import BusOptions, open_session, reaching
 
 
@@ -96,7 +96,10 @@ def entry(body: Callable[[], None]) -> None:
     """Run a component's main and exit with its code."""
 
     def main() -> int:
-        body()
+        try:
+            body()
+        except ModuleNotFoundError as error:
+            raise UserError(f"the package {error.name} is not installed (in a clone: make setup)") from None
         return 0
 
     sys.exit(one_line(main))
