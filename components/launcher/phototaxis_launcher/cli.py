@@ -80,7 +80,7 @@ def extra_with(package: str, usual: str) -> str:
     """An extra that brings a package: the usual one, unless another names it."""
     lines = requires("phototaxis") or []
     found = [match[1] for line in lines if (match := re.match(rf"{package}\b.*extra == .([\w-]+)", line))]
-    return usual if usual in found or not found else found[0]
+    return usual if not found or {*usual.split(",")} & {*found} else found[0]
 
 
 def usage() -> str:
