@@ -1,6 +1,7 @@
 """`phototaxis demo`: the whole story in one command, from a clone to a measured policy."""
 
 import json
+import math
 import subprocess
 import sys
 import time
@@ -18,14 +19,14 @@ from phototaxis.options import flags
 from phototaxis_launcher import up
 from phototaxis_launcher.progress import Progress
 
-SLOW = 5.0
-"""Simulated seconds per second that eyes can follow."""
+TICKS_A_SECOND = 10.0
+"""What eyes can follow."""
 FIRST, LAST = 150, 300
 """Epochs at the beginning and at the end of learning that are shown slowly."""
 SEEN = f"""\
 What is to be seen: on the left the arena with its light, the robot with its sonar rays, its trail coloured by reward;
 in the middle the share of episodes that reached the light, rewards and light; on the right what the robot has learned.
-The first and the last part are shown at {SLOW:g} × real time."""
+The first and the last part are shown slowly, {TICKS_A_SECOND:g} steps a second."""
 PLACEMENTS = 200
 PAPERS_EPOCHS = 3000
 """Learning steps after which the paper measures its Q-table on the simple percept."""
@@ -64,15 +65,25 @@ class Story(up.Show):
         self._fast_from = min(FIRST, options.epochs)
         self._slow_from = max(options.epochs - LAST, self._fast_from)
         self._paced, self._chapter = paced, 0
-        self._before = 0.0, 0
+        self._before, self._step_at = (0.0, 0), math.inf
         self.found: dict[str, Any] | None = None
 
-    def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
-        """Change the speed where a chapter ends, and say what is to be seen in the next.
+    def wait(self) -> float:
+        """Seconds until the next step is due."""
+        return min(max(self._step_at - time.monotonic(), 0.0), super().wait())
 
-        The clock begins when the first tick is answered: so no command is late, and the learner learns what it
-        learns without a clock.
+    def beat(self, bus: Bus) -> None:
+        """Make one step of the paused run where one is due: unlike a clock, it waits for a late answer.
+
+        So the learner learns what it learns at full speed.
         """
+        now = time.monotonic()
+        if now >= self._step_at:
+            bus.control(Control("step"))
+            self._step_at = max(self._step_at + 1 / TICKS_A_SECOND, now)
+
+    def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
+        """Change the speed where a chapter ends, and say what is to be seen in the next."""
         now = time.monotonic()
         (then, epoch), self._before = self._before, (now, status.epoch)
         if not self._paced:
@@ -82,17 +93,18 @@ class Story(up.Show):
         elif self._chapter == 0 and status.driver and not status.waiting_for:
             progress.say(SEEN)
             self._turn(progress, f"The robot knows nothing yet and wanders about, until epoch {self._fast_from}.")
-            bus.control(Control("speed", speed=SLOW))
-            bus.control(Control("resume"))
+            self._step_at = now
         elif self._chapter == 1 and status.epoch >= self._fast_from < self._slow_from:
             self._turn(progress, f"It learns at full speed, until about epoch {self._slow_from}.")
-            bus.control(Control("speed", speed=0.0))
+            self._step_at = math.inf
+            bus.control(Control("resume"))
         elif self._chapter == 2:
             made = status.epoch - epoch
             if status.epoch + made >= self._slow_from:  # the next status would come too late
                 time.sleep(max(self._slow_from - status.epoch, 0) / max(made, 1) * (now - then))
-                bus.control(Control("speed", speed=SLOW))
+                bus.control(Control("pause"))
                 self._turn(progress, f"It has learned: watch it turn to the light, until epoch {status.epochs}.")
+                self._step_at = time.monotonic()
 
     def _turn(self, progress: Progress, text: str) -> None:
         self._chapter += 1

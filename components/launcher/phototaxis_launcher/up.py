@@ -67,6 +67,13 @@ class UpOptions(BusOptions, kw_only=True):
 class Show:
     """What happens for those who watch a run: by default nothing."""
 
+    def wait(self) -> float:
+        """Seconds until `beat` is to be called, at most."""
+        return 0.1
+
+    def beat(self, bus: Bus) -> None:
+        """Time has passed, or something has come."""
+
     def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
         """A status has come."""
 
@@ -165,7 +172,8 @@ class Run:
                     agent.start()
                 deadline = time.monotonic() + STARTING
                 while not self._complete(status) and not self.children["sim"].left:
-                    event = bus.receive(timeout=0.1)
+                    event = bus.receive(timeout=show.wait())
+                    show.beat(bus)
                     self._watch(progress)
                     if event is not None and event.topic == "stop":
                         status = _paused(bus, status)

@@ -259,7 +259,7 @@ class Server:
 
     def _pause(self) -> None:
         """Apply no more commands; the present tick is the last that is recorded, and the driver still answers it."""
-        self._paused = True
+        self._paused, self._steps_due = True, 0
         self._record(self._sim.watched)
 
     @property
