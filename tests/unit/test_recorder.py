@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import rerun as rr
 from phototaxis.arena import Arena, Light, Wall
-from phototaxis.messages import AgentLog, SensorsLog, SimLog, World
+from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
 from phototaxis.recordings import Recording
 from phototaxis.task import ACTIONS, PERCEPTS
 from phototaxis_launcher.recordings import DAY, MEGABYTE, excess
@@ -105,3 +105,30 @@ def test_a_pose_that_nobody_sensed_has_no_rays_of_another(tmp_path: Path, paper:
     recording.disconnect()
     assert sorted(series(tmp_path / "r.rrd", "/world/trail", "Points2D:positions")) == [0, 1, 2]
     assert sorted(series(tmp_path / "r.rrd", "/world/robot/sonar", "Clear:is_recursive")) == [2]
+
+
+@pytest.mark.parametrize(
+    ("learner", "percept", "light", "arena", "shown"),
+    [
+        ("qtable", "simple", "built-in", "paper", True),
+        ("mirror", "simple", "built-in", "paper", False),
+        ("qtable", "rich", "built-in", "paper", False),
+        ("qtable", "simple", "lag.fmu", "paper", False),
+        ("qtable", "simple", "built-in", "mine", False),
+    ],
+)
+def test_the_papers_line_stands_beside_the_papers_system_alone(
+    tmp_path: Path, paper: Arena, learner: str, percept: str, light: str, arena: str, shown: bool
+):
+    recording = rr.RecordingStream("phototaxis", recording_id="r")
+    recording.save(str(tmp_path / "r.rrd"))
+    translator = Translator(recording, World("r", msgspec.structs.replace(paper, name=arena), 0, 0))
+    ended = Episode(run="r", episode=0, tick=1, steps=1, end="reached", driver="a", x=0.0, y=0.0, heading=0.0)
+    none, one = [0, 0], [1.0, 1.0]
+    translator.sim(SimLog("r", 0, "s", "a", [0, 1], none, one, one, one, one, one, one, none, [ended]))
+    translator.sensors(SensorsLog("r", 0, "s", "built-in", light, [0, 1], [1.0] * 32, [0.5] * 4))
+    translator.agent(AgentLog("r", 0, "a", learner, percept, [0, 1], none, none, one, one, one))
+    translator.flush(last=True)
+    recording.disconnect()
+    assert len(series(tmp_path / "r.rrd", "/plots/success/rate", "Scalars:scalars")) == 1
+    assert bool(series(tmp_path / "r.rrd", "/plots/success/paper", "Scalars:scalars")) is shown

@@ -17,7 +17,9 @@ from phototaxis.messages import Control, Status
 from phototaxis.options import flags
 
 from phototaxis_launcher import up
+from phototaxis_launcher.places import places, program
 from phototaxis_launcher.progress import Progress
+from phototaxis_launcher.show import Show
 
 TICKS_A_SECOND = 10.0
 """What eyes can follow."""
@@ -43,11 +45,11 @@ def main(argv: Sequence[str]) -> int:
         print(json.dumps({**result, "evaluation": show.found}), flush=True)
     elif show.found is None:
         print("stopped before the end; nothing is evaluated", file=sys.stderr)
-        print(*up.places(result, status), sep="\n", file=sys.stderr)
+        print(*places(result), sep="\n", file=sys.stderr)
     return INTERRUPTED if run.interrupted else 0
 
 
-class Story(up.Show):
+class Story(Show):
     """The run as a newcomer watches it: slow at first, at full speed, slow again; then what came of it.
 
     Parameters
@@ -110,18 +112,15 @@ class Story(up.Show):
         self._chapter += 1
         progress.say(f"{self._chapter}. {text}")
 
-    def finished(self, run: up.Run, status: Status) -> bool:
+    def finished(self, result: dict[str, Any]) -> bool:
         """Measure the policy, say what came of it, and keep the viewer up where somebody may watch."""
-        checkpoint = run.checkpoint(status)
-        self.found = None if checkpoint is None else self._evaluate(checkpoint)
+        checkpoint = result["checkpoint"]
+        self.found = self._evaluate(checkpoint) if checkpoint else None
         if not self._options.json:
-            print("\n".join(self._summary(run, status, checkpoint)), flush=True)
-        if self._stays:
-            where = f"at {run.url}" if run.url else f"by {up.program()} view"
-            print(f"The viewer stays open {where}; drag its time line to see any moment. Ctrl-C ends.", file=sys.stderr)
+            print("\n".join(self._summary(result)), flush=True)
         return self._stays
 
-    def _evaluate(self, checkpoint: Path) -> dict[str, Any]:
+    def _evaluate(self, checkpoint: str) -> dict[str, Any]:
         """What `phototaxis evaluate` finds.
 
         Raises
@@ -130,25 +129,24 @@ class Story(up.Show):
             when it fails.
         """
         words = [f"--arena={self._options.arena}", f"--placements={PLACEMENTS}", "--json", *flags(self._fmus)]
-        evaluate = [sys.executable, "-m", "phototaxis_launcher", "evaluate", str(checkpoint), *words]
+        evaluate = [sys.executable, "-m", "phototaxis_launcher", "evaluate", checkpoint, *words]
         done = subprocess.run(evaluate, capture_output=True, text=True, check=False, start_new_session=True)
         if done.returncode:
             raise ComponentFailed(f"the evaluation failed: {done.stderr.strip()}")
         return json.loads(done.stdout)
 
-    def _summary(self, run: up.Run, status: Status, checkpoint: Path | None) -> list[str]:
-        result = run.result(status)
-        rate = "" if self._paced else f", at {status.mean_rate:.0f} ticks/s"
-        lines = ["", f"{status.epoch} epochs over the bus in {status.episodes} episodes{rate}."]
-        if checkpoint is not None and self.found is not None:
+    def _summary(self, result: dict[str, Any]) -> list[str]:
+        rate = "" if self._paced else f", at {result['ticks_per_second']} ticks/s"
+        lines = ["", f"{result['epochs']} epochs over the bus in {result['episodes']} episodes{rate}."]
+        if self.found is not None:
             lines += [
                 f"The policy, frozen, reached the light from {self.found['success_rate']:.1%} of {PLACEMENTS} fresh "
                 f"random placements within {self.found['cap']} steps."
             ]
-            if is_the_papers(load(checkpoint)[0], self._options, self._fmus):
+            if is_the_papers(load(Path(result["checkpoint"]))[0], self._options, self._fmus):
                 lines.append('The paper reports "upwards of 80%" for this system (section 6.2).')
-            lines.append(f"Outcomes differ by seed: `{up.program()} train --seeds 0:20` shows twenty of them.")
-        return [*lines, "", *(f"  {line}" for line in up.places(result, status)), ""]
+            lines.append(f"Outcomes differ by seed: `{program()} train --seeds 0:20` shows twenty of them.")
+        return [*lines, "", *(f"  {line}" for line in places(result)), ""]
 
 
 def is_the_papers(meta: Meta, options: up.UpOptions, fmus: FmuOptions) -> bool:

@@ -1,10 +1,7 @@
 """`phototaxis up`: the processes of a run, brought up, watched and ended together."""
 
 import json
-import os
 import re
-import shlex
-import shutil
 import signal
 import sys
 import time
@@ -23,8 +20,10 @@ from phototaxis.ports import find_ports
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
 
+from phototaxis_launcher.places import places, program
 from phototaxis_launcher.processes import Child
 from phototaxis_launcher.progress import Progress
+from phototaxis_launcher.show import Show
 
 PORT = Annotated[int, Meta(ge=-1, le=65535)]
 PATIENCE = {"recorder": 60.0, "agent": 15.0, "sensors": 5.0, "sim": 5.0}
@@ -62,24 +61,6 @@ class UpOptions(BusOptions, kw_only=True):
     """port of the web viewer; 0: any free one; -1: no web viewer"""
     json: bool = False
     """print the result as one JSON object, last on standard output"""
-
-
-class Show:
-    """What happens for those who watch a run: by default nothing."""
-
-    def wait(self) -> float:
-        """Seconds until `beat` is to be called, at most."""
-        return 0.1
-
-    def beat(self, bus: Bus) -> None:
-        """Time has passed, or something has come."""
-
-    def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
-        """A status has come."""
-
-    def finished(self, run: "Run", status: Status) -> bool:
-        """The run is finished; whether everything stays up until it is stopped."""
-        return False
 
 
 class Run:
@@ -191,7 +172,7 @@ class Run:
                 else:
                     status = _last(bus, status) if self.children["sim"].left else status
                     progress.close()
-                    if status.phase == "finished" and show.finished(self, status):
+                    if status.phase == "finished" and show.finished(self.result(status)):
                         self._linger(bus)
             finally:
                 try:
@@ -202,6 +183,8 @@ class Run:
 
     def _linger(self, bus: Bus) -> None:
         """Keep everything up, for those who watch, until a signal or until the simulation is stopped."""
+        where = self.url or f"{program()} view"
+        print(f"Still to be seen: {where}\nDrag the time line to any moment of the run. Ctrl-C ends.", file=sys.stderr)
         while not self.children["sim"].left:
             event = bus.receive(timeout=0.1)
             if event is not None and event.topic == "stop":
@@ -287,7 +270,7 @@ class Run:
         ours = [self._checkpoint(agent.name) for agent in self.agents if last in agent.idents]
         return next((file for file in ours if file.exists()), None)
 
-    def result(self, status: Status) -> dict[str, object]:
+    def result(self, status: Status) -> dict[str, Any]:
         """What the run came to; the learner is the one that drove last, if that is one of ours."""
         checkpoint = self.checkpoint(status)
         meta = load(checkpoint)[0] if checkpoint else None
@@ -383,34 +366,11 @@ def main(argv: Sequence[str]) -> int:
         print(
             f"{result['epochs']} epochs, {result['episodes']} episodes, {result['reached']} of them reached the light; "
             f"{result['ticks_per_second']} ticks/s",
-            *places(result, status),
+            *places(result),
             sep="\n",
             file=sys.stderr,
         )
     return INTERRUPTED if run.interrupted else 0
-
-
-def places(result: dict[str, Any], status: Status) -> list[str]:
-    """Where everything of a run is, and how to look at it again, in lines for a person."""
-    lines = []
-    if recording := result["recording"]:
-        lines += [f"recording   {recording}", f"            look again: {program()} view {shown(recording)}"]
-    if checkpoint := result["checkpoint"]:
-        lines += [f"checkpoint  {checkpoint}", f"            measure it: {program()} evaluate {shown(checkpoint)}"]
-    elif status.drivers:
-        lines.append(f"checkpoint  none: {status.drivers[-1].driver} drove last, and was not started here")
-    return lines
-
-
-def program() -> str:
-    """How this program is called from here."""
-    own = Path(sys.executable).parent / "phototaxis"
-    return "phototaxis" if shutil.which("phototaxis") == str(own) or not own.exists() else shown(str(own))
-
-
-def shown(file: str) -> str:
-    """A file's path as a person at this place would type it."""
-    return shlex.quote(min(file, os.path.relpath(file), key=len))
 
 
 def _bus_flags(options: UpOptions) -> list[str]:
