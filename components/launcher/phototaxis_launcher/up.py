@@ -29,8 +29,8 @@ PORT = Annotated[int, Meta(ge=-1, le=65535)]
 PATIENCE = {"recorder": 60.0, "agent": 15.0, "sensors": 5.0, "sim": 5.0}
 """Seconds that a component gets to end; also the order in which they are ended."""
 SWAPS = re.compile(r"(?P<tick>[0-9]+):(?P<learner>[^:,\s]+)")
-ANSWERED_WITHIN = 2.0
-"""Seconds that the driver gets to answer the last tick of a run that is stopped."""
+ANSWERED_WITHIN = 5.0
+"""Seconds that the simulation gets to pause, and the driver to answer the last tick of a run that is stopped."""
 STARTING = 60.0
 """Seconds within which all components must be on the bus."""
 
@@ -308,14 +308,14 @@ class Run:
 
 
 def _paused(bus: Bus, status: Status) -> Status:
-    """The status of a run that was paused for its end, when the driver has answered its last tick."""
-    reply = bus.control(Control("pause"))
-    if reply is None:
-        return status
-    status, deadline = reply.status, time.monotonic() + ANSWERED_WITHIN
-    while status.phase == "paused" and status.waiting_for and time.monotonic() < deadline:
-        event = bus.receive(timeout=0.1)
-        status = event.message if event is not None and event.topic == "status" else status
+    """The status of a run that is paused for its end, when the driver has answered its last tick."""
+    reply, deadline = bus.control(Control("pause"), ANSWERED_WITHIN), time.monotonic() + ANSWERED_WITHIN
+    while reply is not None:
+        status = reply.status  # asked for: those in the inbox may be older than the pause
+        if status.phase != "paused" or not status.waiting_for or time.monotonic() > deadline:
+            break
+        bus.receive(timeout=0.05)
+        reply = bus.control(Control("status"), ANSWERED_WITHIN)
     return status
 
 

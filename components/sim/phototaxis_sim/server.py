@@ -162,6 +162,8 @@ class Server:
         if self._started is None:
             self._started = now, state.tick
         self._pace.commanded(now)
+        if self._paused:
+            self._record(self._sim.watched)
         if not self._pace.realtime:
             self._answered()
         return None
@@ -258,9 +260,10 @@ class Server:
         return ""
 
     def _pause(self) -> None:
-        """Apply no more commands; the present tick is the last that is recorded, and the driver still answers it."""
+        """Apply no more commands; the present tick is still answered, and is then the last that is recorded."""
         self._paused, self._steps_due = True, 0
-        self._record(self._sim.watched)
+        if self._held is not None:
+            self._record(self._sim.watched)
 
     @property
     def _unanswered(self) -> bool:
