@@ -15,10 +15,14 @@ help: ## list the verbs
 setup: $(VENV)/.ready ## make .venv with everything in it
 
 $(VENV)/.ready: pyproject.toml constraints.txt scripts/setup
-	@PYTHON="$(PYTHON)" TORCH_INDEX="$(TORCH_INDEX)" scripts/setup $(VENV)
+	@PYTHON="$(PYTHON)" TORCH_INDEX="$(TORCH_INDEX)" scripts/setup $(VENV) dev
+	@touch $(VENV)/.demo $@
+
+$(VENV)/.demo: pyproject.toml constraints.txt scripts/setup
+	@PYTHON="$(PYTHON)" scripts/setup $(VENV) demo
 	@touch $@
 
-demo: setup ## learn over the bus, watch, evaluate: about ten seconds once set up
+demo: $(VENV)/.demo ## watch it learn, and see how good it is: about a minute once set up
 	@$(BIN)/phototaxis demo --seed 1
 
 test: setup ## all tests, with real processes on a real bus

@@ -67,9 +67,9 @@ def phototaxis(*words: object, deadline: float = DEADLINE) -> subprocess.Complet
     return subprocess.run(command(*words), capture_output=True, text=True, timeout=deadline, check=False)
 
 
-def result(process: Process) -> dict[str, Any]:
-    """The JSON object that a command printed last."""
-    assert process.end() == 0, process.stderr
+def result(process: Process, code: int = 0) -> dict[str, Any]:
+    """The JSON object that a command printed last, before it ended with `code`."""
+    assert process.end() == code, process.stderr
     return json.loads(process.stdout.splitlines()[-1])
 
 

@@ -105,7 +105,7 @@ def test_it_takes_the_seat_of_a_recorded_run_and_leaves_it(start, up, world, tmp
         status = wait_status(bus, lambda status: status.driver.startswith("gymnasium-"), launcher)
         environment.close()
         wait_status(bus, lambda status: status.driver.startswith("qtable-"), launcher)  # it had waited
-    launcher.popen.send_signal(signal.SIGINT)
+    launcher.popen.send_signal(signal.SIGTERM)
     assert launcher.end() == 0
     recordings = sorted((tmp_path / "runs").glob("*/recording*.rrd"))
     assert len(recordings) == 2, "a seed is a new run"

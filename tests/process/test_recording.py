@@ -67,7 +67,7 @@ def test_the_viewers_page_lives_and_dies_with_the_recorder(start, world, tmp_pat
             lambda status: status.tick > back.tick and any("recorder" in who for who in status.alive),
             launcher,
         )
-        launcher.popen.send_signal(signal.SIGINT)
+        launcher.popen.send_signal(signal.SIGTERM)
         wait(bus, lambda event: event.topic == "gone" and event.message[0] == "sim")
     found = result(launcher)
     assert found["restarts"] == {"recorder": 1}

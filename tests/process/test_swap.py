@@ -84,7 +84,7 @@ def test_swap_is_one_command(up, world):
             assert line in wrong.stderr
             assert wrong.stderr.count("\n") == 1
         assert wait_status(bus, lambda _: True, launcher).driver == swapped["agent"]
-    launcher.popen.send_signal(signal.SIGINT)
+    launcher.popen.send_signal(signal.SIGTERM)
     assert [one["learner"] for one in result(launcher)["drivers"]] == ["ann", "qtable"]
 
 

@@ -45,7 +45,7 @@ def test_status_and_control_from_a_second_terminal(up, world, tmp_path):
         assert again.returncode == 3
         assert f"already running in the world '{world}'" in again.stderr
     launcher.popen.send_signal(signal.SIGINT)
-    found = result(launcher)
+    found = result(launcher, 130)
     assert not found["finished"]
     assert not children(launcher.popen.pid)
 

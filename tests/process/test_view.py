@@ -49,7 +49,7 @@ def test_the_viewer_shows_the_newest_tick(gpu, start, world, tmp_path):
             assert animation.size[0] == 900
             assert len(animation.getcolors(100_000) or ()) > 30, "an empty picture"
         os.kill(children(launcher.popen.pid)["recorder"], signal.SIGKILL)
-        launcher.popen.send_signal(signal.SIGINT)
+        launcher.popen.send_signal(signal.SIGTERM)
     launcher.end()
 
 
@@ -58,7 +58,7 @@ def test_a_recording_that_nobody_closed_is_mended_for_the_viewer(up, world, tmp_
     with observer(world) as bus:
         wait_status(bus, lambda status: status.tick > 100, launcher)
         os.kill(children(launcher.popen.pid)["recorder"], signal.SIGKILL)
-        launcher.popen.send_signal(signal.SIGINT)
+        launcher.popen.send_signal(signal.SIGTERM)
     launcher.end()
     broken = next((tmp_path / "runs").glob("*/recording.rrd"))
     assert subprocess.run([RERUN, "rrd", "verify", broken], capture_output=True, check=False).returncode != 0

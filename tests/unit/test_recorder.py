@@ -9,7 +9,7 @@ import pytest
 import rerun as rr
 from disks import no_file_larger_than
 from phototaxis.arena import Arena, Light, Wall
-from phototaxis.messages import AgentLog, SensorsLog, SimLog, World
+from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
 from phototaxis.ports import free_ports
 from phototaxis.recordings import Recording as Listed
 from phototaxis.recordings import Summary, summary_file
@@ -194,3 +194,30 @@ def test_ticks_without_a_command_are_told_in_a_few_lines(tmp_path: Path, paper: 
         at = [0.0]
         translator.sim(SimLog("r", tick, "s", "", [tick], [0], at, at, at, at, at, at, [0], [], late))
     assert told == [f"{late} ticks without a command in time so far" for late in (1, 3, 6)]
+
+
+@pytest.mark.parametrize(
+    ("learner", "percept", "light", "arena", "shown"),
+    [
+        ("qtable", "simple", "built-in", "paper", True),
+        ("mirror", "simple", "built-in", "paper", False),
+        ("qtable", "rich", "built-in", "paper", False),
+        ("qtable", "simple", "lag.fmu", "paper", False),
+        ("qtable", "simple", "built-in", "mine", False),
+    ],
+)
+def test_the_papers_line_stands_beside_the_papers_system_alone(
+    tmp_path: Path, paper: Arena, learner: str, percept: str, light: str, arena: str, shown: bool
+):
+    recording = rr.RecordingStream("phototaxis", recording_id="r")
+    recording.save(str(tmp_path / "r.rrd"))
+    translator = Translator(recording, World("r", msgspec.structs.replace(paper, name=arena), 0, 0))
+    ended = Episode(run="r", episode=0, tick=1, steps=1, end="reached", driver="a", x=0.0, y=0.0, heading=0.0)
+    none, one = [0, 0], [1.0, 1.0]
+    translator.sim(SimLog("r", 0, "s", "a", [0, 1], none, one, one, one, one, one, one, none, [ended]))
+    translator.sensors(SensorsLog("r", 0, "s", "built-in", light, [0, 1], [1.0] * 32, [0.5] * 4))
+    translator.agent(AgentLog("r", 0, "a", learner, percept, [0, 1], none, none, one, one, one))
+    translator.flush(last=True)
+    recording.disconnect()
+    assert len(series(tmp_path / "r.rrd", "/plots/success/rate", "Scalars:scalars")) == 1
+    assert bool(series(tmp_path / "r.rrd", "/plots/success/paper", "Scalars:scalars")) is shown

@@ -15,7 +15,7 @@ import msgspec
 from msgspec import Meta
 
 from phototaxis.bus import Bus
-from phototaxis.errors import leave, one_line
+from phototaxis.errors import UserError, leave, one_line
 from phototaxis.session import BusOptions, open_session, place, reaching
 from phototaxis.words import WORD
 
@@ -50,6 +50,11 @@ def run(
 
     SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it. With several `worlds` in
     place of `options.name`, each is served in a thread of its own; the first error ends all of them.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        when all is closed after SIGINT, so that the exit code says so.
     """
     ident = options.ident or made_up(label or role, options.id)
     with ExitStack() as stack:
@@ -60,24 +65,31 @@ def run(
             buses.append(stack.enter_context(Bus(session, name, role, ident, partial(reaching, session, own))))
             line = f"{ident}: {role} of the world '{name}', {place(own)}; waits for {WAITS_FOR[role]}"
             print(line, file=sys.stderr, flush=True)
-        stop = partial(_stop, buses)
+        stop, signals = partial(_stop, buses), list[int]()
         for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, stop)
+            signal.signal(number, lambda number, _: (signals.append(number), stop()))
         if options.tethered:
             threading.Thread(target=_hold_tether, args=(stop,), daemon=True).start()
-        if len(buses) == 1:
-            serve(buses[0])
-            return
-        with ThreadPoolExecutor(len(buses)) as pool:
-            served = [pool.submit(serve, bus) for bus in buses]
-            while wait(served, timeout=0.2).not_done:  # and signals are looked for
-                if any(one.done() and one.exception() for one in served):
-                    stop()
-        for one in served:
-            one.result()
+        _serve(buses, serve, stop)
+    if signal.SIGINT in signals:
+        raise KeyboardInterrupt
 
 
-def _stop(buses: Sequence[Bus], *_: object) -> None:
+def _serve(buses: Sequence[Bus], serve: Callable[[Bus], None], stop: Callable[[], None]) -> None:
+    """Serve one bus here, or each of several in a thread of its own."""
+    if len(buses) == 1:
+        serve(buses[0])
+        return
+    with ThreadPoolExecutor(len(buses)) as pool:
+        served = [pool.submit(serve, bus) for bus in buses]
+        while wait(served, timeout=0.2).not_done:  # and signals are looked for
+            if any(one.done() and one.exception() for one in served):
+                stop()
+    for one in served:
+        one.result()
+
+
+def _stop(buses: Sequence[Bus]) -> None:
     for bus in buses:
         bus.stop()
 
@@ -97,7 +109,10 @@ def entry(body: Callable[[], None]) -> None:
     """Run a component's main and exit with its code."""
 
     def main() -> int:
-        body()
+        try:
+            body()
+        except ModuleNotFoundError as error:
+            raise UserError(f"the package {error.name} is not installed (in a clone: make setup)") from None
         return 0
 
     leave(one_line(main))

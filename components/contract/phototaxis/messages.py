@@ -207,7 +207,7 @@ class Status(Message):
     run: Name
     phase: Phase
     waiting_for: str = ""
-    """Whom a waiting simulation waits for."""
+    """Whom a waiting simulation waits for; of a paused one, whose answer to the present tick is not there yet."""
     waited: float = 0.0
     """Seconds without an answer."""
     speed: float = 0.0

@@ -4,6 +4,7 @@ import os
 import socket
 from collections.abc import Mapping
 from contextlib import ExitStack
+from pathlib import Path
 
 from phototaxis.errors import Unavailable
 
@@ -32,9 +33,28 @@ def find_ports(host: str, wanted: Mapping[str, int]) -> list[int]:
             try:
                 server = held.enter_context(socket.create_server((host, port)))
             except OSError as error:
+                why = _holder(port) or os.strerror(error.errno or 0)
                 raise Unavailable(
-                    f"port {port} on {host} is not free ({os.strerror(error.errno or 0)}); "
-                    f"choose another with {flag} (0: any free one)"
+                    f"port {port} on {host} is not free ({why}); choose another with {flag} (0: any free one)"
                 ) from None
             found.append(server.getsockname()[1])
     return found
+
+
+def _holder(port: int) -> str:
+    """Which process listens on a port, as far as this user may know; "" otherwise."""
+    try:
+        import psutil
+    except ModuleNotFoundError:
+        return ""
+    try:
+        listening = [one for one in psutil.net_connections("tcp") if one.status == psutil.CONN_LISTEN and one.laddr]
+        pids = [one.pid for one in listening if one.laddr[1:] == (port,)]
+        if os.getpid() in pids:
+            return "another option names it too"
+        words = psutil.Process(pids[0]).cmdline() if pids and pids[0] else []
+    except psutil.Error:
+        return ""
+    if words:
+        return f"process {pids[0]} listens there: {' '.join([Path(words[0]).name, *words[1:3]])}"
+    return "a process of another user listens there" if pids else ""

@@ -1,5 +1,6 @@
 """Where the live view is found, and the program that shows it."""
 
+import os
 from pathlib import Path
 
 
@@ -13,3 +14,11 @@ def rerun_program() -> Path:
     import rerun_cli
 
     return Path(rerun_cli.__file__).parent / "rerun"
+
+
+def silence_rerun() -> None:
+    """Keep Rerun, in this process and those that it starts, from reporting its use to its makers.
+
+    It reports nothing where the variable CI is set; `FORCE_RERUN_ANALYTICS` overrules that.
+    """
+    os.environ.setdefault("CI", "true")

@@ -12,6 +12,8 @@ from phototaxis.messages import Control, ControlReply, Seed, Status
 from phototaxis.options import parse
 from phototaxis.session import BusOptions, open_session
 
+from phototaxis_launcher.progress import success
+
 PATIENCE = 2.0
 
 
@@ -81,8 +83,7 @@ def describe(status: Status) -> list[str]:
         "run": status.run,
         "phase": phase,
         "tick": f"{status.tick}  (epoch {status.epoch}{f' of {status.epochs}' if status.epochs else ''})",
-        "episode": f"{status.episode}  ({status.reached} of {status.episodes} reached the light, "
-        f"{status.recent:.0%} of the last 50)",
+        "episode": f"{status.episode}  ({success(status)})",
         "speed": f"{speed}, {status.rate:.0f} ticks/s",
         "driver": status.driver or "nobody",
         "alive": ", ".join(who.split("/")[1] for who in status.alive if not who.startswith("observer/")),

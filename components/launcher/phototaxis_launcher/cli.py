@@ -1,8 +1,10 @@
 """The one command line: a table of subcommands, each loaded when it is called."""
 
+import re
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.metadata import requires
 from typing import NamedTuple
 
 from phototaxis import __version__
@@ -21,7 +23,7 @@ class Verb(NamedTuple):
 
 
 VERBS = {
-    "demo": Verb("phototaxis_launcher.demo:main", "all", "learn 3,000 epochs over the bus, watch, evaluate"),
+    "demo": Verb("phototaxis_launcher.demo:main", "demo", "learn 3,000 epochs over the bus, watch, evaluate"),
     "up": Verb("phototaxis_launcher.up:main", "launcher", "start a run: sim, sensors, agent, recorder"),
     "status": Verb(
         "phototaxis_launcher.ask:status", "launcher", "who is alive, which tick, who drives, what is awaited"
@@ -70,9 +72,16 @@ def dispatch(words: list[str]) -> int:
         return command(words[1:]) or 0
     except ModuleNotFoundError as error:
         raise UserError(
-            f"'phototaxis {words[0]}' needs the package {error.name}; "
-            f"install it with: pip install 'phototaxis[{verb.extra}]'"
+            f"'phototaxis {words[0]}' needs the package {error.name}; install it with: "
+            f"pip install 'phototaxis[{extra_with(error.name or '', verb.extra)}]' (in a clone: make setup)"
         ) from None
+
+
+def extra_with(package: str, usual: str) -> str:
+    """An extra that brings a package: the usual one, unless another names it."""
+    lines = requires("phototaxis") or []
+    found = [match[1] for line in lines if (match := re.match(rf"{package}\b.*extra == .([\w-]+)", line))]
+    return usual if not found or {*usual.split(",")} & {*found} else found[0]
 
 
 def usage() -> str:

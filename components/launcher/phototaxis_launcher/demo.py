@@ -1,48 +1,159 @@
 """`phototaxis demo`: the whole story in one command, from a clone to a measured policy."""
 
 import json
+import math
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from phototaxis.bus import Bus
+from phototaxis.checkpoint import Meta, load
 from phototaxis.errors import ComponentFailed
+from phototaxis.fmu import FmuOptions
+from phototaxis.messages import Control, Status
 from phototaxis.options import flags
 
 from phototaxis_launcher import up
+from phototaxis_launcher.places import places, program
 from phototaxis_launcher.progress import Progress
+from phototaxis_launcher.show import Show
+
+TICKS_A_SECOND = 10.0
+"""What eyes can follow."""
+FIRST, LAST = 150, 300
+"""Epochs at the beginning and at the end of learning that are shown slowly."""
+SEEN = f"""\
+What is to be seen: on the left the arena with its light, the robot with its sonar rays, its trail coloured by reward;
+in the middle the share of episodes that reached the light, rewards and light; on the right what the robot has learned.
+The first and the last part are shown slowly, {TICKS_A_SECOND:g} steps a second."""
+PLACEMENTS = 200
+PAPERS_EPOCHS = 3000
+"""Learning steps after which the paper measures its Q-table on the simple percept."""
 
 
 def main(argv: Sequence[str]) -> int:
     options, fmus, words = up.parse(argv, "phototaxis demo")
+    watched = sys.stderr.isatty() and not (options.json or options.no_recorder)
+    show = Story(options, fmus, stays=watched, paced=bool(watched and options.epochs and not options.speed))
     run = up.Run(options, fmus, words)
-    status = run.go(Progress(options.epochs))
+    status = run.go(Progress(options.epochs), show)
     result = run.result(status)
-    if not result["finished"]:
+    if options.json:
+        print(json.dumps({**result, "evaluation": show.found}), flush=True)
+    elif show.found is None:
         print("stopped before the end; nothing is evaluated", file=sys.stderr)
-        return 0
-    if result["checkpoint"] is None:
-        run.judge()
-    placements = 200
-    evaluate = [sys.executable, "-m", "phototaxis_launcher", "evaluate", str(run.checkpoint), "--json", *flags(fmus)]
-    evaluate.append(f"--arena={options.arena}")
-    done = subprocess.run([*evaluate, f"--placements={placements}"], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise ComponentFailed(f"the evaluation failed: {done.stderr.strip()}")
-    found = json.loads(done.stdout)
-    print(
-        f"""
-{result["epochs"]} epochs over the bus in {result["episodes"]} episodes, at {result["ticks_per_second"]} ticks/s.
-The policy, frozen, reached the light from {found["success_rate"]:.1%} of {placements} fresh random placements
-within {found["cap"]} steps. The paper reports "upwards of 80%" for this system (section 6.2).
+        print(*places(result), sep="\n", file=sys.stderr)
+    return run.end(status)
 
-  (Outcomes differ by seed: `phototaxis train --seeds 0:20` shows twenty of them.)
 
-  watched at  {run.url or "(no viewer)"}
-  recording   {result["recording"]}
-              look again: {Path(sys.executable).parent / "phototaxis"} view {result["recording"]}
-  checkpoint  {result["checkpoint"]}
-              measure again: {Path(sys.executable).parent / "phototaxis"} evaluate {result["checkpoint"]}"""
+class Story(Show):
+    """The run as a newcomer watches it: slow at first, at full speed, slow again; then what came of it.
+
+    Parameters
+    ----------
+    stays : the viewer stays up until Ctrl-C.
+    paced : the run begins slowly, learns at full speed, and ends slowly.
+
+    Attributes
+    ----------
+    found : what the evaluation of the learned policy gave, or None.
+    """
+
+    def __init__(self, options: up.UpOptions, fmus: FmuOptions, stays: bool, paced: bool):
+        self._options, self._fmus, self._stays = options, fmus, stays
+        self._fast_from = min(FIRST, options.epochs)
+        self._slow_from = max(options.epochs - LAST, self._fast_from)
+        self._paced, self._chapter = paced, 0
+        self._before, self._step_at = (0.0, 0), math.inf
+        self.found: dict[str, Any] | None = None
+
+    def wait(self) -> float:
+        """Seconds until the next step is due."""
+        return min(max(self._step_at - time.monotonic(), 0.0), super().wait())
+
+    def beat(self, bus: Bus) -> None:
+        """Make one step of the paused run where one is due: unlike a clock, it waits for a late answer.
+
+        So the learner learns what it learns at full speed.
+        """
+        now = time.monotonic()
+        if now >= self._step_at:
+            bus.control(Control("step"))
+            self._step_at = max(self._step_at + 1 / TICKS_A_SECOND, now)
+
+    def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
+        """Change the speed where a chapter ends, and say what is to be seen in the next."""
+        now = time.monotonic()
+        (then, epoch), self._before = self._before, (now, status.epoch)
+        if not self._paced:
+            return
+        if self._chapter == 0 and status.phase != "paused":
+            bus.control(Control("pause"))
+        elif self._chapter == 0 and status.driver and not status.waiting_for:
+            progress.say(SEEN)
+            self._turn(progress, f"The robot knows nothing yet and wanders about, until epoch {self._fast_from}.")
+            self._step_at = now
+        elif self._chapter == 1 and status.epoch >= self._fast_from < self._slow_from:
+            self._turn(progress, f"It learns at full speed, until about epoch {self._slow_from}.")
+            self._step_at = math.inf
+            bus.control(Control("resume"))
+        elif self._chapter == 2:
+            made = status.epoch - epoch
+            if status.epoch + made >= self._slow_from:  # the next status would come too late
+                time.sleep(max(self._slow_from - status.epoch, 0) / max(made, 1) * (now - then))
+                bus.control(Control("pause"))
+                self._turn(progress, f"It has learned: watch it turn to the light, until epoch {status.epochs}.")
+                self._step_at = time.monotonic()
+
+    def _turn(self, progress: Progress, text: str) -> None:
+        self._chapter += 1
+        progress.say(f"{self._chapter}. {text}")
+
+    def finished(self, result: dict[str, Any]) -> bool:
+        """Measure the policy, say what came of it, and keep the viewer up where somebody may watch."""
+        checkpoint = result["checkpoint"]
+        self.found = self._evaluate(checkpoint) if checkpoint else None
+        if not self._options.json:
+            print("\n".join(self._summary(result)), flush=True)
+        return self._stays
+
+    def _evaluate(self, checkpoint: str) -> dict[str, Any]:
+        """What `phototaxis evaluate` finds.
+
+        Raises
+        ------
+        ComponentFailed
+            when it fails.
+        """
+        words = [f"--arena={self._options.arena}", f"--placements={PLACEMENTS}", "--json", *flags(self._fmus)]
+        evaluate = [sys.executable, "-m", "phototaxis_launcher", "evaluate", checkpoint, *words]
+        done = subprocess.run(evaluate, capture_output=True, text=True, check=False, start_new_session=True)
+        if done.returncode:
+            raise ComponentFailed(f"the evaluation failed: {done.stderr.strip()}")
+        return json.loads(done.stdout)
+
+    def _summary(self, result: dict[str, Any]) -> list[str]:
+        rate = "" if self._paced else f", at {result['ticks_per_second']} ticks/s"
+        lines = ["", f"{result['epochs']} epochs over the bus in {result['episodes']} episodes{rate}."]
+        if self.found is not None:
+            lines += [
+                f"The policy, frozen, reached the light from {self.found['success_rate']:.1%} of {PLACEMENTS} fresh "
+                f"random placements within {self.found['cap']} steps."
+            ]
+            if is_the_papers(load(Path(result["checkpoint"]))[0], self._options, self._fmus):
+                lines.append('The paper reports "upwards of 80%" for this system (section 6.2).')
+            lines.append(f"Outcomes differ by seed: `{program()} train --seeds 0:20` shows twenty of them.")
+        return [*lines, "", *(f"  {line}" for line in places(result)), ""]
+
+
+def is_the_papers(meta: Meta, options: up.UpOptions, fmus: FmuOptions) -> bool:
+    """Whether a run was of the system for which the paper reports its 80%."""
+    system = (meta.learner, meta.percept, meta.arena, options.epochs, options.robots, options.swap)
+    return (
+        system == ("qtable", "simple", "paper", PAPERS_EPOCHS, 1, "")
+        and meta.reward in ("own", "difference")
+        and fmus == FmuOptions()
     )
-    run.judge()
-    return 0

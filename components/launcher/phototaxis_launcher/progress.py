@@ -20,7 +20,7 @@ class Progress:
     def show(self, status: Status) -> None:
         """Bring the display up to date."""
         facts = (
-            f"{status.recent:.0%} of the last 50 episodes reached the light, {status.rate:.0f} ticks/s"
+            f"{success(status)}, {status.rate:.0f} ticks/s"
             if status.phase != "waiting"
             else f"waiting for {status.waiting_for} ({status.waited:.0f} s)"
         )
@@ -43,3 +43,12 @@ class Progress:
     def close(self) -> None:
         if self._bar is not None:
             self._bar.close()
+
+
+def success(status: Status) -> str:
+    """How many of the newest episodes reached the light, in words."""
+    if not status.episodes:
+        return "no episode has ended yet"
+    if status.episodes == 1:
+        return "the first episode " + ("reached the light" if status.reached else "did not reach the light")
+    return f"{status.recent:.0%} of the last {min(status.episodes, 50)} episodes reached the light"

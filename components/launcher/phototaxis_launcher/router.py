@@ -4,6 +4,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
+from phototaxis.errors import INTERRUPTED
 from phototaxis.options import parse
 from phototaxis.session import BusOptions, open_router
 
@@ -19,5 +20,5 @@ def main(argv: Sequence[str]) -> int:
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)  # a handler's word is lost when it comes just before we wait for it
     with open_router(options) as session:
         print(f"router {session.zid()} is up", file=sys.stderr, flush=True)
-        signal.sigwait(ends)
-    return 0
+        ended_by = signal.sigwait(ends)
+    return INTERRUPTED if ended_by == signal.SIGINT else 0

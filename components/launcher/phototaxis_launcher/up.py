@@ -9,27 +9,31 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from msgspec import Meta
 from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
-from phototaxis.errors import ComponentFailed, Unavailable, UserError, warn
+from phototaxis.errors import INTERRUPTED, ComponentFailed, Unavailable, UserError, warn
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import MOST, Count, Launch, LaunchReply, Seed, Status
+from phototaxis.messages import MOST, Control, Count, Launch, LaunchReply, Seed, Status
 from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.ports import find_ports
 from phototaxis.session import BusOptions, open_session
 from phototaxis.viewer import viewer_url
 
 from phototaxis_launcher.folder import RunFolder
+from phototaxis_launcher.places import places, program
 from phototaxis_launcher.processes import Child
 from phototaxis_launcher.progress import Progress
+from phototaxis_launcher.show import Show
 
 PORT = Annotated[int, Meta(ge=-1, le=65535)]
 PATIENCE = {"recorder": 60.0, "agent": 15.0, "sensors": 5.0, "sim": 5.0}
 """Seconds that a component gets to end; also the order in which they are ended."""
 SWAPS = re.compile(r"(?P<tick>[0-9]+):(?P<learner>[^:,\s]+)")
+ANSWERED_WITHIN = 5.0
+"""Seconds that the simulation gets to pause, and the driver to answer the last tick of a run that is stopped."""
 SILENT = 5.0
 """Seconds after which a driver that is there but does not answer is named."""
 MOSTLY = 0.95
@@ -82,11 +86,12 @@ class Run:
         self._begun = False
         self._lost: UserError | None = None
         """How the recorder ended before the run did."""
-        self.checkpoint = self._checkpoint("agent")
-        """That of the agent that drove last."""
+        self.interrupted = False
+        """Whether Ctrl-C ended it."""
         self.recording = self.folder / "recording.rrd"
         self.url = ""
         self._alive: list[str] = []
+        self._announced = self.name
         bus = self._bus = _bus_flags(options)
         common = [f"--run={self.name}", f"--arena={options.arena}", f"--seed={options.seed}"]
         self.agents: list[Child] = []
@@ -124,19 +129,26 @@ class Run:
     def _checkpoint(self, name: str) -> Path:
         return self.folder / f"{name.replace('agent', 'checkpoint')}.npz"
 
-    def go(self, progress: Progress) -> Status:
+    def go(self, progress: Progress, show: Show | None = None) -> Status:
         """Start, watch until finished or stopped, end; the last status.
 
-        The agent is started when everyone else is on the bus, so that the recording has every tick.
+        The agent is started when everyone else is on the bus, so that the recording has every tick. A run that is
+        stopped is paused first: status, checkpoints and recording then end with the same tick.
         """
+        show = show or Show()
         status = Status(self.name, "waiting")
         with (
             self._folder_of_a_run(),
             open_session("launcher", self._options) as session,
             Bus(session, self._options.name, "launcher", f"up-{self.name}") as bus,
         ):
+
+            def end(number: int, _: object) -> None:
+                self.interrupted = self.interrupted or number == signal.SIGINT
+                bus.stop()
+
             for number in (signal.SIGTERM, signal.SIGINT):
-                signal.signal(number, lambda *_: bus.stop())
+                signal.signal(number, end)
             try:
                 for role, child in self.children.items():
                     if role != "agent":
@@ -145,9 +157,11 @@ class Run:
                     agent.start()
                 deadline = time.monotonic() + STARTING
                 while not self._complete(status) and not self.children["sim"].left:
-                    event = bus.receive(timeout=0.1)
+                    event = bus.receive(timeout=show.wait())
+                    show.beat(bus)
                     self._watch(progress)
                     if event is not None and event.topic == "stop":
+                        status = _paused(bus, status)
                         break
                     if event is not None and event.topic == "launch":
                         self._launch(event, progress)
@@ -159,12 +173,30 @@ class Run:
                         self._complain(status, progress)
                         self._confirm(status)
                         self._miss(status, progress)
+                        show.follow(status, bus, progress)
                     if self.children["agent"].process is None:
                         self._start_agent(status, deadline, progress)
+                else:
+                    status = _last(bus, status) if self.children["sim"].left else status
+                    progress.close()
+                    if status.phase == "finished" and show.finished(self.result(status)):
+                        self._linger(bus, progress)
             finally:
-                progress.close()
-                self.stop()
+                try:
+                    progress.close()
+                finally:
+                    self.stop()
         return status
+
+    def _linger(self, bus: Bus, progress: Progress) -> None:
+        """Keep everything up, for those who watch, until a signal or until the simulation is stopped."""
+        where = self.url or f"{program()} view"
+        print(f"Still to be seen: {where}\nDrag the time line to any moment of the run. Ctrl-C ends.", file=sys.stderr)
+        while not self.children["sim"].left:
+            event = bus.receive(timeout=0.1)
+            if event is not None and event.topic == "stop":
+                return
+            self._watch(progress)
 
     @contextmanager
     def _folder_of_a_run(self) -> Iterator[None]:
@@ -212,9 +244,7 @@ class Run:
         progress.say(f"asked to swap: {child.name} is started")
 
     def _confirm(self, status: Status) -> None:
-        """Note whose checkpoint counts; tell those who asked for a swap that it has happened."""
-        driving = [agent for agent in self.agents if status.driver and status.driver in agent.idents]
-        self.checkpoint = self._checkpoint(driving[0].name) if driving else self.checkpoint
+        """Tell those who asked for a swap that it has happened."""
         for child, _ in list(self._pending):
             for seating in status.drivers:
                 if seating.driver in child.idents:
@@ -240,9 +270,12 @@ class Run:
         return bool(asked)
 
     def _report(self, status: Status, progress: Progress) -> None:
-        """Say what the status warns of, and who is alive when that changes."""
+        """Say what the status warns of, when a new run begins by request, and who is alive when that changes."""
         for line in status.warnings:
             warn(line)
+        if status.run != self._announced:
+            self._announced = status.run
+            progress.say(f"a new run begins, as was asked for: {status.run}")
         alive = [who.split("/")[1] for who in status.alive if not who.startswith("observer/")]
         if alive != self._alive:
             self._alive = alive
@@ -278,16 +311,22 @@ class Run:
             for child in self.agents if role == "agent" else [self.children[role]] if role in self.children else []:
                 child.stop(patience)
 
-    def result(self, status: Status) -> dict[str, object]:
-        """What the run came to; the learner is the one that drove last."""
-        saved = self.checkpoint.exists() and not any(agent.fault() for agent in self.agents)
-        meta = load(self.checkpoint)[0] if saved else None
+    def checkpoint(self, status: Status) -> Path | None:
+        """That of the agent that drove last; None when it is not one of ours, or could not save its last state."""
+        last = status.drivers[-1].driver if status.drivers else ""
+        ours = [self._checkpoint(agent.name) for agent in self.agents if last in agent.idents and not agent.fault()]
+        return next((file for file in ours if file.exists()), None)
+
+    def result(self, status: Status) -> dict[str, Any]:
+        """What the run came to; the learner is the one that drove last, if that is one of ours."""
+        checkpoint = self.checkpoint(status)
+        meta = load(checkpoint)[0] if checkpoint else None
         names = {ident: agent for agent in self.agents for ident in agent.idents}
         recordings = sorted(self.folder.glob("recording*.rrd"), key=lambda path: path.stat().st_mtime)
         return {
-            "run": self.name,
+            "run": status.run,
             "arena": self._options.arena,
-            "seed": self._options.seed,
+            "seed": self._options.seed if status.run == self.name else None,
             "learner": meta.learner if meta else None,
             "drivers": [
                 {
@@ -309,7 +348,7 @@ class Run:
             "state_hash": status.hash,
             "learner_hash": meta.learner_hash if meta else None,
             "recording": str(recordings[-1]) if recordings else None,
-            "checkpoint": str(self.checkpoint) if meta else None,
+            "checkpoint": str(checkpoint) if checkpoint else None,
             "restarts": {child.name: child.restarts for child in self._all() if child.restarts},
             "late_ticks": status.late,
             "late_sensors": status.late_sensors,
@@ -322,10 +361,45 @@ class Run:
         unsaved = [Unavailable(fault) for child in self._all() if (fault := child.fault())]
         return [*([self._lost] if self._lost else []), *unsaved]
 
-    def judge(self) -> None:
-        """Raise what did not keep the run from its end: a recording or a checkpoint that could not be written."""
+    def end(self, status: Status) -> int:
+        """The exit code of a run whose result is told.
+
+        Raises
+        ------
+        UserError
+            for what did not keep the run from its end: a recording or a checkpoint that could not be written, or a
+            robot that stood still since no command came in time.
+        """
         for fault in self._faults():
             raise fault
+        if self.interrupted:
+            return INTERRUPTED
+        if status.late > MOSTLY * status.tick:
+            part = "sensors" if 2 * status.late_sensors > status.late else "agent"
+            line = f"only {status.tick - status.late} of {status.tick} ticks had a command in time"
+            raise ComponentFailed(
+                f"{line}, the robot stood still: the {part} cannot keep up; lower --speed (0: as fast as it goes)"
+            )
+        return 0
+
+
+def _paused(bus: Bus, status: Status) -> Status:
+    """The status of a run that is paused for its end, when the driver has answered its last tick."""
+    reply, deadline = bus.control(Control("pause"), ANSWERED_WITHIN), time.monotonic() + ANSWERED_WITHIN
+    while reply is not None:
+        status = reply.status  # asked for: those in the inbox may be older than the pause
+        if status.phase != "paused" or not status.waiting_for or time.monotonic() > deadline:
+            break
+        bus.receive(timeout=0.05)
+        reply = bus.control(Control("status"), ANSWERED_WITHIN)
+    return status
+
+
+def _last(bus: Bus, status: Status) -> Status:
+    """The last status of a simulation that has ended by request."""
+    while (event := bus.receive(timeout=0.2)) is not None:
+        status = event.message if event.topic == "status" else status
+    return status
 
 
 def successor(first: list[str], words: list[str]) -> list[str]:
@@ -375,25 +449,18 @@ def main(argv: Sequence[str]) -> int:
     if options.json:
         print(json.dumps(result), flush=True)
     else:
-        summarise(result)
-    run.judge()
-    if status.late > MOSTLY * status.tick:
-        part = "sensors" if 2 * status.late_sensors > status.late else "agent"
-        line = f"only {status.tick - status.late} of {status.tick} ticks had a command in time, the robot stood still"
-        raise ComponentFailed(f"{line}: the {part} cannot keep up; lower --speed (0: as fast as it goes)")
-    return 0
+        print(*summary(result), sep="\n", file=sys.stderr)
+    return run.end(status)
 
 
-def summarise(result: dict[str, object]) -> None:
-    """The result for a person, on stderr."""
-    lines = [
+def summary(result: dict[str, Any]) -> list[str]:
+    """The result in lines for a person."""
+    line = (
         f"{result['epochs']} epochs, {result['episodes']} episodes, {result['reached']} of them reached the light; "
-        f"{result['ticks_per_second']} ticks/s",
-        *([f"late        {result['late_ticks']} ticks without a command in time"] if result["late_ticks"] else []),
-        f"recording   {result['recording']}",
-        f"checkpoint  {result['checkpoint']}",
-    ]
-    print("\n".join(lines), file=sys.stderr)
+        f"{result['ticks_per_second']} ticks/s"
+    )
+    late = [f"late        {result['late_ticks']} ticks without a command in time"] if result["late_ticks"] else []
+    return [line, *late, *places(result)]
 
 
 def _bus_flags(options: UpOptions) -> list[str]:

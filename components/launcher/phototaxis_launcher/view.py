@@ -15,11 +15,12 @@ from msgspec import Meta
 from phototaxis.disk import try_file
 from phototaxis.errors import ComponentFailed, Unavailable, UserError
 from phototaxis.options import parse
+from phototaxis.page import ViewerPage
 from phototaxis.ports import find_ports
 from phototaxis.recordings import recordings
-from phototaxis.viewer import rerun_program, viewer_url
+from phototaxis.viewer import rerun_program, silence_rerun, viewer_url
 
-PORT = Annotated[int, Meta(ge=1, le=65535)]
+PORT = Annotated[int, Meta(ge=0, le=65535)]
 
 
 class Options(msgspec.Struct, kw_only=True):
@@ -36,9 +37,9 @@ class Options(msgspec.Struct, kw_only=True):
     seconds: Annotated[float, Meta(ge=1, le=60)] = 5.0
     """when the picture is taken, and how long the animation is"""
     grpc_port: PORT = 9876
-    """the recorder's port, for the live view; with a RUN in the browser, the port that serves it"""
+    """the recorder's port, for the live view; with a RUN in the browser, the port that serves it (0: any free one)"""
     web_port: PORT = 9090
-    """the port of the web viewer"""
+    """the port of the web viewer (with a RUN, 0: any free one)"""
 
 
 def main(argv: Sequence[str]) -> int:
@@ -49,6 +50,7 @@ def main(argv: Sequence[str]) -> int:
     if options.picture:
         try_file(Path(options.picture), "--picture")
     web = options.web or not has_display()
+    silence_rerun()
     if options.run:
         with tempfile.TemporaryDirectory(prefix="phototaxis-") as folder:
             return show(str(whole(find(options.run, Path(options.out)), Path(folder))), options, web)
@@ -114,10 +116,13 @@ def show(file: str, options: Options, web: bool) -> int:
         return draw(file, options)
     if not web:
         return native(file)
-    find_ports("127.0.0.1", {"--grpc-port": options.grpc_port, "--web-port": options.web_port})
-    print(f"{file}: look at {viewer_url(options.web_port, options.grpc_port)} (Ctrl-C ends)", file=sys.stderr)
-    ports = ("--port", str(options.grpc_port), "--web-viewer-port", str(options.web_port))
-    return native("--serve-web", "--bind", "127.0.0.1", *ports, file)
+    grpc, web_port = find_ports("127.0.0.1", {"--grpc-port": options.grpc_port, "--web-port": options.web_port})
+    page = ViewerPage("127.0.0.1", web_port, grpc)
+    try:
+        print(f"{file}: look at {viewer_url(web_port, grpc)} (Ctrl-C ends)", file=sys.stderr, flush=True)
+        return native("--serve-grpc", "--bind", "127.0.0.1", "--port", str(grpc), file)
+    finally:
+        page.close()
 
 
 def draw(source: str, options: Options) -> int:
@@ -129,7 +134,7 @@ def draw(source: str, options: Options) -> int:
 
 
 def native(*words: str) -> int:
-    """Run Rerun's program until it ends, or Ctrl-C."""
+    """Run Rerun's program until it ends; with Ctrl-C both end."""
     viewer = subprocess.Popen([rerun_program(), *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     signal.signal(signal.SIGTERM, lambda *_: viewer.terminate())
     try:
@@ -137,7 +142,7 @@ def native(*words: str) -> int:
     except KeyboardInterrupt:
         viewer.terminate()
         viewer.communicate()
-        return 0
+        raise
     if viewer.returncode not in (0, -signal.SIGTERM):
         last = (errors.strip().splitlines() or ["without a word"])[-1]
         raise ComponentFailed(f"the Rerun viewer ended with {viewer.returncode}: {last}")

@@ -14,8 +14,9 @@ from phototaxis.disk import try_file, try_folder
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse
+from phototaxis.page import ViewerPage
 from phototaxis.ports import find_ports
-from phototaxis.viewer import viewer_url
+from phototaxis.viewer import silence_rerun, viewer_url
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -41,9 +42,10 @@ def main(argv: Sequence[str] | None = None) -> None:
         raise UserError(
             f"--bind {options.bind}: others could watch, and nothing guards that; use 127.0.0.1, or add --insecure"
         )
+    silence_rerun()
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")  # its files get their footer later
     from phototaxis_recorder.server import Server
-    from phototaxis_recorder.sinks import Page, Recording
+    from phototaxis_recorder.sinks import Recording
 
     output = Path(options.output)
     if output.is_dir():
@@ -58,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         print(f"recorder: records the run {world.run} into {file}", file=sys.stderr, flush=True)
         return Recording(world, file, options.bind, grpc_port, options.memory)
 
-    page = Page(options.bind, web_port, grpc_port) if web_port >= 0 else None
+    page = ViewerPage(options.bind, web_port, grpc_port) if web_port >= 0 else None
     if page is not None:
         print(f"recorder: watch at {viewer_url(web_port, grpc_port)}", file=sys.stderr, flush=True)
 

@@ -1,4 +1,4 @@
-"""Where a recording goes: a file, the live gRPC server, and a page with the web viewer."""
+"""Where a recording goes: a file, and the live gRPC server."""
 
 import os
 import shutil
@@ -149,24 +149,3 @@ def complete(file: Path) -> None:
         os.replace(part, file)
     else:
         part.unlink(missing_ok=True)
-
-
-class Page:
-    """The web viewer's page, served by Rerun's own program on one address.
-
-    A shell holds the program by its standard input, so that it ends even when this process is killed.
-    """
-
-    def __init__(self, host: str, port: int, grpc_port: int):
-        source = f"rerun+http://localhost:{grpc_port}/proxy"
-        serve = [rerun_program(), "--serve-web", "--bind", host, "--web-viewer-port", str(port), source]
-        self._process = subprocess.Popen(
-            ["/bin/sh", "-c", '"$@" & cat >/dev/null; kill $!; wait', "page", *serve],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-
-    def close(self) -> None:
-        """End the program."""
-        self._process.communicate()

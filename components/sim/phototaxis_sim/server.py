@@ -1,5 +1,6 @@
 """The simulation on the bus: asks each tick, waits for its answer, keeps the seat and the status."""
 
+import math
 import re
 import secrets
 import sys
@@ -26,6 +27,8 @@ from phototaxis_sim.simulation import Simulation, Snapshot
 STATUS_EVERY = 0.2
 WAITS_AFTER = 0.5
 """Seconds without an answer after which the status says "waiting" and for whom."""
+ANSWERED_WITHIN = 2.0
+"""Seconds that the driver gets to answer the last tick of a simulation that was asked to stop."""
 HEIR_WITHIN = 3.0
 """Seconds that a continued simulation keeps the seat for its former driver."""
 
@@ -73,6 +76,8 @@ class Server:
         self._alive: set[str] = set()
         self._held: Command | CommandOfMany | None = None
         self._paused = self._stopping = self._finished = False
+        self._stop_by = math.inf
+        """When a simulation that was asked to stop waits no longer for the answer to its last tick."""
         self._steps_due = 0
         self._recent: deque[bool] = deque(maxlen=50)
         self._status_at = self._rate_at = 0.0
@@ -83,6 +88,8 @@ class Server:
         self._unkept = ""
         """That the journal is given up, and why."""
         self._recorded: Recorded | None = None
+        self._logged_until = ("", -1)
+        """Run and tick of the newest row of the log."""
         self._log = Chunks(bus, "log/sim", self._chunk)
         self._seat = Seat()
         self._lateness, self._told = Lateness(), ""
@@ -109,6 +116,9 @@ class Server:
             self._log.poll(now)
             if now >= self._status_at:
                 self._announce(now)
+            if now >= self._stop_by or (self._stop_by < math.inf and not self._unanswered):
+                self._stopping = True
+        self._record(self._sim.watched)
         self._log.flush()
         self._announce(time.monotonic())
 
@@ -175,6 +185,8 @@ class Server:
             self._started = now, state.tick
             self._say(f"{command.author} drives in the run {state.run}, from tick {state.tick} on")
         self._pace.commanded(now)
+        if self._paused:
+            self._record(self._sim.watched)
         if not self._pace.realtime:
             self._answered()
         return None
@@ -250,7 +262,7 @@ class Server:
                 self._ask()
             return reason
         if verb == "pause":
-            self._paused = True
+            self._pause()
         elif verb == "resume":
             self._paused, self._steps_due = False, 0
             self._pace.set(self._pace.speed, now)
@@ -270,7 +282,8 @@ class Server:
         elif verb == "begin":
             self._begin(request.seed)
         elif verb == "stop":
-            self._bus.stop()
+            self._pause()
+            self._stop_by = now + ANSWERED_WITHIN
         return ""
 
     def _pace_set(self) -> None:
@@ -284,6 +297,17 @@ class Server:
 
     def _say(self, text: str) -> None:
         print(f"sim: {text}", file=sys.stderr, flush=True)
+
+    def _pause(self) -> None:
+        """Apply no more commands; the present tick is still answered, and is then the last that is recorded."""
+        self._paused, self._steps_due = True, 0
+        if self._held is not None:
+            self._record(self._sim.watched)
+
+    @property
+    def _unanswered(self) -> bool:
+        """Whether the driver has yet to answer the present tick."""
+        return bool(self._seat.driver) and self._held is None and not self._finished
 
     def _begin(self, seed: int) -> None:
         """A new run in the same arena; its name says from which it comes, for the journal."""
@@ -316,7 +340,7 @@ class Server:
         if self._finished:
             return "finished", "", 0.0
         if self._paused:
-            return "paused", "", 0.0
+            return "paused", f"the command of {self._seat.driver}" if self._unanswered else "", 0.0
         waited = now - self._question.asked_at
         missing = [role for role in ("sensors", "agent") if not any(a.startswith(role + "/") for a in self._alive)]
         if missing:
@@ -361,6 +385,9 @@ class Server:
         self._bus.put("status", status)
 
     def _record(self, s: State) -> None:
+        if self._logged_until == (s.run, s.tick):
+            return
+        self._logged_until = s.run, s.tick
         if s.driver != self._logged:  # a chunk has one driver
             self._log.flush()
             self._logged = s.driver

@@ -1,0 +1,131 @@
+"""What the launcher says and decides, without processes."""
+
+import os
+import socket
+import sys
+
+import pytest
+from phototaxis.errors import Unavailable
+from phototaxis.fmu import FmuOptions
+from phototaxis.messages import Control, Status, World
+from phototaxis.ports import find_ports, free_ports
+from phototaxis_agent.setup import make_setup
+from phototaxis_launcher import demo, up
+from phototaxis_launcher.cli import extra_with
+from phototaxis_launcher.places import places
+from phototaxis_launcher.progress import success
+from phototaxis_sim import arenas
+
+
+class Wire:
+    """A bus that notes what is asked of the simulation."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def control(self, request: Control) -> None:
+        self.asked.append(request.verb)
+
+
+class Said(list[str]):
+    def say(self, text: str) -> None:
+        self.append(text)
+
+
+def test_a_watched_demo_begins_and_ends_slowly():
+    story = demo.Story(up.UpOptions(epochs=3000), FmuOptions(), stays=True, paced=True)
+    wire, said = Wire(), Said()
+
+    def at(epoch: int, phase: str = "paused", driver: str = "qtable-1", waiting_for: str = "") -> list[str]:
+        wire.asked.clear()
+        story.follow(Status("r", phase, waiting_for, epoch=epoch, epochs=3000, driver=driver), wire, said)  # pyright: ignore
+        return [*wire.asked]
+
+    def due() -> bool:
+        wire.asked.clear()
+        story.beat(wire)  # pyright: ignore
+        return wire.asked == ["step"]
+
+    assert at(0, "waiting", driver="") == ["pause"], "before anybody drives"
+    assert at(0, waiting_for="the command of qtable-1") == []
+    assert not due(), "the first tick is not answered yet"
+    assert at(0) == []
+    assert due()
+    assert 0 < story.wait() <= 0.1
+    assert not due(), "one step at a time"
+    assert at(149) == []
+    assert at(150) == ["resume"]
+    assert not due()
+    assert at(400, "running") == []
+    assert at(2699, "running") == ["pause"], "the next status would come too late"
+    assert due()
+    assert [line[:2] for line in said[1:]] == ["1.", "2.", "3."]
+
+
+def test_a_demo_that_nobody_watches_is_left_alone():
+    story = demo.Story(up.UpOptions(epochs=3000), FmuOptions(), stays=False, paced=False)
+    wire, said = Wire(), Said()
+    for epoch in range(0, 3001, 100):
+        story.follow(Status("r", "running", epoch=epoch, epochs=3000, driver="q"), wire, said)  # pyright: ignore
+        story.beat(wire)  # pyright: ignore
+    assert not wire.asked
+    assert not said
+
+
+@pytest.mark.parametrize(
+    ("learner", "given", "options", "fmus", "is_it"),
+    [
+        ("qtable", {}, {}, {}, True),
+        ("mirror", {}, {}, {}, False),
+        ("qtable", {"percept": "rich"}, {}, {}, False),
+        ("qtable", {"reward": "potential"}, {}, {}, False),
+        ("qtable", {}, {"epochs": 500}, {}, False),
+        ("qtable", {}, {"arena": "doorway"}, {}, False),
+        ("qtable", {}, {"swap": "10:qtable"}, {}, False),
+        ("qtable", {}, {}, {"light_fmu": "lag.fmu"}, False),
+    ],
+)
+def test_the_papers_number_is_told_of_the_papers_system_alone(learner, given, options, fmus, is_it):
+    arena = arenas.load(options.get("arena", "paper"))
+    meta = make_setup(learner, **given).agent(World(run="r", arena=arena, seed=0, epochs=3000)).checkpoint()[0]
+    assert demo.is_the_papers(meta, up.UpOptions(**options), FmuOptions(**fmus)) is is_it
+
+
+def test_success_is_told_of_episodes_that_have_ended():
+    def told(episodes: int, reached: int, recent: float) -> str:
+        return success(Status("r", "running", episodes=episodes, reached=reached, recent=recent))
+
+    assert told(0, 0, 0.0) == "no episode has ended yet"
+    assert told(1, 0, 0.0) == "the first episode did not reach the light"
+    assert told(4, 3, 0.75) == "75% of the last 4 episodes reached the light"
+    assert told(90, 50, 0.9) == "90% of the last 50 episodes reached the light"
+
+
+def test_the_end_says_how_to_look_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = str(tmp_path / "my runs" / "recording.rrd")
+    lines = places({"recording": file, "checkpoint": None, "drivers": [{"driver": "stranger-1"}]})
+    assert lines[0].endswith(file)
+    assert lines[1].endswith("phototaxis view 'my runs/recording.rrd'")
+    assert lines[2] == "checkpoint  none: stranger-1 drove last, and was not started here"
+    assert not any("http" in line for line in lines), "the address is dead by then"
+
+
+def test_a_busy_port_says_who_holds_it(monkeypatch):
+    (port,) = free_ports(1)
+    with pytest.raises(Unavailable, match=rf"port {port} .*another option names it too\); choose another with --web"):
+        find_ports("127.0.0.1", {"--grpc-port": port, "--web-port": port})
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port, own = taken.getsockname()[1], os.getpid()
+        monkeypatch.setattr(os, "getpid", lambda: -1)
+        with pytest.raises(Unavailable, match=rf"process {own} listens there: \S*py"):
+            find_ports("127.0.0.1", {"--web-port": port})
+        monkeypatch.setitem(sys.modules, "psutil", None)
+        with pytest.raises(Unavailable, match="Address already in use"):
+            find_ports("127.0.0.1", {"--web-port": port})
+
+
+def test_a_missing_package_names_its_extra():
+    assert extra_with("torch", "agent") == "agent"
+    assert extra_with("fmpy", "sensors,fmu") == "sensors,fmu"
+    assert extra_with("no_such_package", "lab") == "lab"
