@@ -47,7 +47,7 @@ PORT = "an endpoint is like tcp/127.0.0.1:7447"
         ("fmu info binary", "binary: not an FMU"),
         ("view nothing", "no recording of a run 'nothing'"),
         ("status --connect nowhere", PORT),
-        ("status --name a/b", "--name a/b: expected letters, digits, '.', '_' and '-', as in phototaxis"),
+        ("status --name a/b", "--name a/b: expected up to 40 letters, digits, '_', '.' and '-'"),
         ("status --zenoh-config garbage", "garbage: not a Zenoh configuration"),
         ("control resum", "VERB resum: no such verb; did you mean resume? there are: pause, resume"),
         ("control juggle", "no such verb; there are: pause, resume"),

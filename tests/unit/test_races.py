@@ -12,7 +12,7 @@ from phototaxis.component import made_up
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis_launcher import folder, recordings
-from phototaxis_recorder.sinks import fresh_file
+from phototaxis_recorder.file import fresh_file
 
 MANY = 8
 

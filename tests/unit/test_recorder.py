@@ -18,7 +18,8 @@ from phototaxis_launcher.recordings import DAY, MEGABYTE, excess
 from phototaxis_recorder import policy
 from phototaxis_recorder.colors import of_distance, of_reward
 from phototaxis_recorder.field import CELLS, light_field
-from phototaxis_recorder.sinks import Recording, fresh_file
+from phototaxis_recorder.file import fresh_file
+from phototaxis_recorder.sinks import Recording
 from phototaxis_recorder.translate import Translator
 from phototaxis_sensors.light import LightModel
 from phototaxis_sensors.model import Past

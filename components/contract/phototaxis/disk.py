@@ -36,16 +36,20 @@ def try_file(path: Path, option: str) -> None:
         raise _refused(path, option, error) from None
 
 
-def try_folder(folder: Path, option: str) -> None:
-    """Find out now whether a folder is there or can be made, and files be written in it; see `try_file`."""
+def try_folder(folder: Path, option: str, keep: bool = False) -> None:
+    """Find out now whether a folder is there or can be made, and files be written in it; see `try_file`.
+
+    With `keep` a folder that had to be made stays.
+    """
     made = [part for part in (folder, *folder.parents) if not part.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _try(folder / ".trial")
     except OSError as error:
+        keep = False
         raise _refused(folder, option, error) from None
     finally:
-        for part in made:
+        for part in [] if keep else made:
             with suppress(OSError):
                 part.rmdir()
 

@@ -49,7 +49,7 @@ class Results:
     def __init__(self, folder: Path, cells: Sequence[Cell]):
         self._path, self.cells = folder / "results.jsonl", list(cells)
         self._waiting: list[bytes] = []
-        try_folder(folder, "--out")
+        try_folder(folder, "--out", keep=True)
         make_folder(folder)
         try:
             self._extend(folder / "grid.json")
@@ -145,9 +145,9 @@ def alone_in(folder: Path) -> Iterator[None]:
     UserError
         when the folder cannot be used.
     """
+    try_folder(folder, "--out", keep=True)
     with ExitStack() as stack:
         try:
-            folder.mkdir(parents=True, exist_ok=True)
             lock = os.open(folder, os.O_RDONLY)
             stack.callback(os.close, lock)
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

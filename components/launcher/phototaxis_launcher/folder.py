@@ -18,11 +18,9 @@ class RunFolder:
     """
 
     def __init__(self, out: Path):
-        out = out.resolve()
-        try_folder(out, "--out")
-        self._made = [part for part in (out, *out.parents) if not part.exists()]
-        make_folder(out)
-        self.path = self._fresh(out)
+        self._made = [part for part in (out.resolve(), *out.resolve().parents) if not part.exists()]
+        try_folder(out, "--out", keep=True)  # taken away again, it might be missing to a run that starts now
+        self.path = self._fresh(out.resolve())
 
     def remove(self) -> None:
         """Take the folder away with all that is in it, and what had to be made for it where nothing else is in it."""
@@ -33,11 +31,12 @@ class RunFolder:
 
     def _fresh(self, out: Path) -> Path:
         while True:
+            make_folder(out)
             folder = out / run_name()
             try:
                 folder.mkdir()
                 return folder
-            except FileExistsError:
+            except (FileExistsError, FileNotFoundError):  # another run took the name, or `out` away
                 continue
             except OSError as error:
                 raise unwritten(folder, error) from None

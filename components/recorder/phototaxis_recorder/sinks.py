@@ -3,17 +3,16 @@
 import os
 import shutil
 import subprocess
-from contextlib import suppress
-from itertools import count
 from pathlib import Path
 
 import rerun as rr
-from phototaxis.disk import unwritten, write_all
+from phototaxis.disk import unwritten
 from phototaxis.errors import Unavailable, warn
 from phototaxis.messages import World
 from phototaxis.recordings import write_summary
 from phototaxis.viewer import rerun_program
 
+from phototaxis_recorder.file import RecordingFile
 from phototaxis_recorder.layout import blueprint
 from phototaxis_recorder.translate import Translator
 
@@ -21,35 +20,31 @@ LARGE = 250_000_000
 """Bytes above which a recording is not rewritten at its end: that takes more than twice as much memory."""
 LOW = 200_000_000
 """Bytes that are left on a disk below which a recording warns."""
-TRIAL = 1_000_000
-"""Bytes that are written to find out why a file cannot be written on."""
 
 
 class Recording:
     """The recording of one run: a live server, and a file whose summary says how far it goes.
 
     At the first failure the file is cut back to what the last summary tells, and is written no more; the live
-    view goes on. Rerun does not say that its file has failed, but cannot be flushed any more. The file has no
-    footer while it grows: Rerun would keep the footer's entries in memory, some 20 MB a minute at full speed.
+    view goes on. The file has no footer while it grows: Rerun would keep the footer's entries in memory, some
+    20 MB a minute at full speed.
 
     Attributes
     ----------
     translator : takes what is to be recorded.
+    file : where it is recorded, or was to be.
     fault : why the file is not written any more, or lacks its summary, in a line; "" while all is well.
     low : that its disk is nearly full, in a line; "" while it is not.
     kept : the newest tick that is in the file; −1 for none.
     """
 
     def __init__(self, world: World, wanted: Path, host: str, grpc_port: int, memory: str):
-        self.fault, self.low, self.kept = "", "", -1
-        self._size, self._stopped = 0, False
+        self.file, self.fault, self.low, self.kept = wanted, "", "", -1
+        self._size, self._stopped, self._out = 0, False, self._open()
         sinks: list[rr.GrpcServerSink | rr.FileSink] = [rr.GrpcServerSink(host, grpc_port, server_memory_limit=memory)]
-        try:
-            self.file = fresh_file(wanted)
-            sinks.append(rr.FileSink(str(self.file), write_footer=False))
-        except OSError as error:
-            self.file = wanted
-            self._stop(str(unwritten(wanted, error)))
+        if self._out is not None:
+            self.file = self._out.path
+            sinks.append(rr.FileSink(self._out.sink, write_footer=False))
         self._stream = rr.RecordingStream("phototaxis", recording_id=f"{world.run}-{self.file.stem}")
         rr.set_log_time_enabled(False, recording=self._stream)
         self._stream.set_sinks(*sinks, default_blueprint=blueprint(world.arena, world.epochs))
@@ -60,21 +55,22 @@ class Recording:
 
     def keep(self) -> None:
         """Bring to disk what was logged, then the summary of it."""
-        if self._stopped:
+        if self._out is None or self._stopped:
             return
         summary = self.translator.summary
         try:
             self._stream.flush()
-            size = self.file.stat().st_size
+            size = self._out.settle()
             if size == self._size:
                 return
             write_summary(self.file, summary)
         except (RuntimeError, OSError) as error:
-            self._cut(str(unwritten(self.file, error)) if isinstance(error, OSError) else self._cause())
+            self._stopped = True
+            self._out.cut(self._size)
+            told = f"recorded up to tick {self.kept}" if self.kept >= 0 else "nothing is recorded"
+            self._fail(f"{unwritten(self.file, error) if isinstance(error, OSError) else error}; {told}")
         except Unavailable as error:  # the recording itself is well
-            if self.fault != str(error):
-                self.fault = str(error)
-                self._tell(self.fault)
+            self._fail(str(error))
         else:
             self.fault, self._size, self.kept = "", size, summary.tick
             self._mind_the_space()
@@ -82,8 +78,17 @@ class Recording:
     def close(self) -> None:
         """Close the file, and add its footer where there is room."""
         self._stream.disconnect()
-        if not self._stopped:
-            complete(self.file)
+        if self._out is not None:
+            self._out.close()
+            if not self._stopped:
+                complete(self.file)
+
+    def _open(self) -> RecordingFile | None:
+        try:
+            return RecordingFile(self.file)
+        except OSError as error:
+            self.fault = f"{unwritten(self.file, error)}; nothing is recorded"
+            return None
 
     def _mind_the_space(self) -> None:
         free = shutil.disk_usage(self.file.parent).free
@@ -91,45 +96,14 @@ class Recording:
             self.low = f"{self.file}: less than {LOW / 1e6:.0f} MB are left on its disk"
             self._tell(self.low)
 
-    def _cause(self) -> str:
-        """Why nothing more can be written to the file."""
-        try:
-            file = os.open(self.file, os.O_WRONLY | os.O_APPEND)
-            try:
-                write_all(file, bytes(TRIAL))
-            finally:
-                os.close(file)
-        except OSError as error:
-            return str(unwritten(self.file, error))
-        return f"{self.file}: could not be written for a moment"
-
-    def _cut(self, fault: str) -> None:
-        """Take back what the last summary does not tell of; without one, the file."""
-        with suppress(OSError):
-            if self._size:
-                os.truncate(self.file, self._size)
-            else:
-                self.file.unlink()
-        self._stop(fault)
-        self._tell(self.fault)
-
-    def _stop(self, fault: str) -> None:
-        self._stopped = True
-        self.fault = f"{fault}; " + (f"recorded up to tick {self.kept}" if self.kept >= 0 else "nothing is recorded")
+    def _fail(self, fault: str) -> None:
+        if self.fault != fault:
+            self.fault = fault
+            self._tell(fault)
 
     def _tell(self, text: str) -> None:
         warn(text)
         self.translator.event(text)
-
-
-def fresh_file(wanted: Path) -> Path:
-    """Make `wanted`, or the same with -2, -3, … where a file stands already: no recording is overwritten."""
-    for number in count(1):
-        file = wanted if number == 1 else wanted.with_name(f"{wanted.stem}-{number}{wanted.suffix}")
-        with suppress(FileExistsError):
-            file.touch(exist_ok=False)
-            return file
-    raise AssertionError
 
 
 def complete(file: Path) -> None:
