@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from phototaxis_lab.cell import Outcome
+from phototaxis_lab.cell import Outcome, System
 from phototaxis_lab.reproduction import claims, page, plan
 from phototaxis_lab.statistics import Interval
 from PIL import Image
@@ -29,6 +29,15 @@ def made_up(success: dict[str, float]) -> dict[str, dict[int, list[Outcome]]]:
             for epochs in budgets
         }
         for name, (system, budgets) in plan.WHOLE.items()
+    }
+
+
+def made_up_fresh() -> dict[tuple[System, int], list[Outcome]]:
+    """Outcomes on fresh seeds, of which one is bad."""
+    seeds = plan.fresh_seeds(SEEDS)
+    return {
+        (system, epochs): [outcome(seed, 0.2 if seed == seeds[7] else 0.98) for seed in seeds]
+        for system, (epochs,) in plan.FRESH.values()
     }
 
 
@@ -87,13 +96,16 @@ def test_time_in_states_is_judged_by_the_three_most_met():
 
 
 def test_the_page_has_every_claim_system_and_figure(tmp_path: Path):
-    page.write(tmp_path, made_up({}), range(2))
+    page.write(tmp_path, made_up({}), made_up_fresh(), SEEDS)
     text = (tmp_path / "README.md").read_text()
     assert "$" not in text.replace("```sh", "")
     assert all(claim.says in text for claim in claims.CLAIMS)
     assert len(claims.CLAIMS) == 11
     assert all(f"| {name} |" in text for name in plan.WHOLE)
     assert "Braitenberg" in text
+    row = next(line for line in text.splitlines() if line.startswith("| mirror, rich | 10,000 |"))
+    assert "29 of 30" in row
+    assert "(1007)" in row.split("|")[5].split(",")[0]
     for figure in tmp_path.glob("*.png"):
         assert f"({figure.name})" in text
         with Image.open(figure) as image:

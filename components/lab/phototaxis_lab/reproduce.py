@@ -17,7 +17,7 @@ class Options(Running, kw_only=True):
     seeds: SEEDS = "0:20"
     """A:B: the seeds from A to B − 1"""
     results: str = "runs/reproduction"
-    """folder of the results, paper/ and beyond/; an interrupted reproduction continues there"""
+    """folder of the results, paper/, beyond/ and fresh/; an interrupted reproduction continues there"""
     out: str = "docs/reproduction"
     """folder that the page and its figures are written to"""
 
@@ -31,17 +31,20 @@ def main(argv: Sequence[str]) -> int:
 
     try_folder(out, "--out")
     try_folder(Path(options.results), "--results")
+    parts = {part: plan.cells(planned, seeds) for part, planned in plan.PARTS.items()}
+    parts["fresh"] = plan.cells(plan.FRESH, plan.fresh_seeds(seeds))
     found = {}
-    for number, (part, planned) in enumerate(plan.PARTS.items(), start=1):
-        began, cells = time.monotonic(), plan.cells(planned, seeds)
-        print(f"{part}, {number} of {len(plan.PARTS)} parts", file=sys.stderr)
-        found |= by_system(compute(cells, Path(options.results) / part, options))
+    for number, (part, cells) in enumerate(parts.items(), start=1):
+        began = time.monotonic()
+        print(f"{part}, {number} of {len(parts)} parts", file=sys.stderr)
+        found[part] = by_system(compute(cells, Path(options.results) / part, options))
         print(f"{part}: {(time.monotonic() - began) / 60:.1f} minutes", file=sys.stderr)
+    whole = found["paper"] | found["beyond"]
     data = {
-        name: {epochs: found[system, epochs] for epochs in budgets} for name, (system, budgets) in plan.WHOLE.items()
+        name: {epochs: whole[system, epochs] for epochs in budgets} for name, (system, budgets) in plan.WHOLE.items()
     }
     print("writing the page and its figures", file=sys.stderr)
     make_folder(out)
-    page.write(out, data, seeds)
+    page.write(out, data, found["fresh"], seeds)
     print(out / "README.md")
     return 0

@@ -44,7 +44,7 @@ class Mirror(Learner):
     Options = Hyperparameters
     presets: ClassVar[dict[str, dict[str, Any]]] = {
         "": {"reward": "potential", "hot": 0.12, "cold": 0.06, "cooling": 0.6, "cap": 200},
-        "rich": {"cap": 100, "cold": 0.08, "start": 1.0, "ridge": 1.0},
+        "rich": {"cap": 100, "cold": 0.1, "start": 1.0, "ridge": 1.0},
     }
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):

@@ -10,19 +10,33 @@ from phototaxis.disk import write_whole
 from phototaxis.task import FORWARD, PERCEPTS
 from phototaxis_sim import arenas
 
-from phototaxis_lab.cell import PLACEMENTS, Cell, Outcome, learn
+from phototaxis_lab.cell import PLACEMENTS, Cell, Outcome, System, learn
 from phototaxis_lab.controllers import Braitenberg, Random
 from phototaxis_lab.measure import Evaluation, Policy, measure
 from phototaxis_lab.reproduction import figures
 from phototaxis_lab.reproduction.claims import CLAIMS, Data, between, state_shares
-from phototaxis_lab.reproduction.plan import BEYOND, DISCOUNTS, EXCHANGED, PAPER, PROPOSED, SHADOWS, WHOLE, Plan
+from phototaxis_lab.reproduction.plan import (
+    BEYOND,
+    DISCOUNTS,
+    EXCHANGED,
+    PAPER,
+    PROPOSED,
+    SHADOWS,
+    WHOLE,
+    Plan,
+    fresh_seeds,
+)
 from phototaxis_lab.statistics import mean_interval, median_interval
 
 TUNING = "100 to 460"
 """The seeds that hyperparameters were chosen on."""
 
 
-def write(folder: Path, data: Data, seeds: range) -> None:
+Fresh = Mapping[tuple[System, int], Sequence[Outcome]]
+"""Outcomes of each system and number of epochs, on the seeds of `fresh_seeds`."""
+
+
+def write(folder: Path, data: Data, fresh: Fresh, seeds: range) -> None:
     """Write `README.md` and the figures into `folder`."""
     fixed = {arena: controllers(arena, seeds) for arena in ("paper", "shadows")}
     draw(folder, data, seeds, fixed["paper"])
@@ -35,6 +49,9 @@ def write(folder: Path, data: Data, seeds: range) -> None:
         systems=systems_table({**PAPER, **EXCHANGED, **DISCOUNTS, **PROPOSED, **BEYOND}, data, fixed["paper"]),
         shadows=systems_table(SHADOWS, data, fixed["shadows"]),
         hyperparameters=hyperparameters(),
+        fresh=fresh_table(fresh),
+        fresh_first=fresh_seeds(seeds).start,
+        fresh_last=fresh_seeds(seeds).stop - 1,
     )
     write_whole(folder / "README.md", text.encode())
 
@@ -111,6 +128,23 @@ def _columns(found: Sequence[Outcome] | Sequence[Evaluation]) -> str:
             f"{good} of {len(success)}",
         )
     )
+
+
+def fresh_table(fresh: Fresh) -> str:
+    """One row for each system, with its worst five seeds."""
+    rows = ["| learner, percept | epochs | median [95%] | seeds ≥ 95% | worst five seeds |", "|---|--:|---|--:|---|"]
+    for (system, epochs), found in fresh.items():
+        rates = [one.success_rate for one in found]
+        worst = ", ".join(f"{one.success_rate:.1%} ({one.seed})" for one in sorted(found, key=_success)[:5])
+        good = sum(rate >= 0.95 for rate in rates)
+        median = f"{np.median(rates):.1%} {between(median_interval(rates))}"
+        name = f"{system.learner}, {system.percept}"
+        rows.append(f"| {name} | {epochs:,} | {median} | {good} of {len(rates)} | {worst} |")
+    return "\n".join(rows)
+
+
+def _success(outcome: Outcome) -> float:
+    return outcome.success_rate
 
 
 def hyperparameters() -> str:

@@ -78,6 +78,30 @@ PARTS: Mapping[str, Plan] = {
 
 WHOLE: Plan = {name: planned for plan in PARTS.values() for name, planned in plan.items()}
 
+FRESH: Plan = {
+    f"{learner}, {percept}": (System(learner, percept), (epochs,))
+    for learner, percept, epochs in (
+        ("qtable", "simple", 3000),
+        ("ann", "simple", 3000),
+        ("ann-linear", "simple", 3000),
+        ("ann-per-action", "simple", 3000),
+        ("elman", "simple", 3000),
+        ("qlambda", "simple", 3000),
+        ("qlambda", "rich", 10_000),
+        ("mirror", "simple", 1000),
+        ("mirror", "rich", 10_000),
+        ("dqn", "simple", 3000),
+        ("dqn", "rich", 5000),
+        ("dqn", "continuous", 1000),
+    )
+}
+"""Every learner as it comes, on seeds that nothing was chosen on and nothing else is reported on."""
+
+
+def fresh_seeds(seeds: range) -> range:
+    """Five times as many seeds as elsewhere, from 1,000 on."""
+    return range(1000, 1000 + 5 * len(seeds))
+
 
 def cells(plan: Plan, seeds: range) -> list[Cell]:
     """Everything that is planned, with every seed."""
