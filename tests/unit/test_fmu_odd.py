@@ -42,18 +42,28 @@ def drive(count: int, episode: int = 15) -> list[Past]:
     return [Past(t, t // episode, 5 + 4 * math.sin(a), 5 + 4 * math.cos(1.3 * a), a) for t, a in enumerate(angles)]
 
 
+class Makes:
+    """Makes FMU sensors."""
+
+    def __init__(self):
+        self._made: list[FmuSensors] = []
+
+    def __call__(self, **options) -> FmuSensors:
+        self._made.append(FmuSensors(FmuOptions(**options)))
+        return self._made[-1]
+
+    def end(self) -> None:
+        """End all of them: then what they said has been shown."""
+        while self._made:
+            self._made.pop().close()
+
+
 @pytest.fixture
 def sensors():
     """Makes FMU sensors that end with the test."""
-    made = []
-
-    def make(**options) -> FmuSensors:
-        made.append(FmuSensors(FmuOptions(**options)))
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.close()
+    makes = Makes()
+    yield makes
+    makes.end()
 
 
 def readings(make: FmuSensors, arena: Arena, moments: list[Past], kind: str = "light") -> list[list[float]]:
@@ -228,6 +238,7 @@ def test_warnings_are_shown(paper: Arena, sensors, tmp_path: Path, capsys, versi
     said = SAYS[version] % (status, words)
     odd = altered(tmp_path / "odd.fmu", "lag", version, {"if (m) begin(m);": said})
     readings(sensors(light_fmu=str(odd)), paper, drive(1))
+    sensors.end()
     assert capsys.readouterr().err.splitlines() == [f"sensors: light FMU odd.fmu {line}" for line in shown]
 
 
@@ -235,6 +246,7 @@ def test_messages_of_fmi_2_are_formatted(paper: Arena, sensors, tmp_path: Path, 
     said = SAYS[2] % ("Warning", '"100%% of %s, %d and %g", "all", 42, 0.5')
     odd = altered(tmp_path / "odd.fmu", "lag", 2, {"if (m) begin(m);": said})
     readings(sensors(light_fmu=str(odd)), paper, drive(1))
+    sensors.end()
     assert "logs warning: 100% of all, 42 and 0.5" in capsys.readouterr().err
 
 
@@ -246,11 +258,13 @@ def test_logging_is_on_by_request_and_after_a_failure(paper: Arena, sensors, tmp
     odd = altered(tmp_path / "odd.fmu", "faulty", version, code)
     words = {"light_fmu": str(odd), "fmu_fallback": True, "fmu_param": ["fault=1", "at=2"]}
     readings(sensors(**words), paper, drive(4))
+    sensors.end()
     lines = capsys.readouterr().err.splitlines()
     assert "verbose" not in lines[0]
     assert "at tick 1; restarted" in lines[0]
     assert lines[1].endswith("logs warning: verbose")
     readings(sensors(light_fmu=str(odd), fmu_log=True), paper, drive(1))
+    sensors.end()
     assert "logs warning: verbose" in capsys.readouterr().err
 
 
@@ -270,6 +284,7 @@ def test_what_an_fmu_says_is_bounded(paper: Arena, sensors, tmp_path: Path, caps
     }
     odd = altered(tmp_path / "odd.fmu", "faulty", 3, code)
     readings(sensors(light_fmu=str(odd), fmu_map=["raw=u", "reading=y"], fmu_param=["at=99"]), paper, drive(5))
+    sensors.end()
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == SHOWN + 1
     assert lines[0].endswith("prints: line 0 of 0")

@@ -235,5 +235,5 @@ def test_presets_are_defaults_that_can_be_overruled():
     assert make_setup("mirror", reward="difference").task.scheme().scheme == "difference"
     with pytest.raises(UserError, match=r"no option 'speed' of the learner mirror; there are: .*gamma"):
         make_setup("mirror", speed=3)
-    with pytest.raises(UserError, match=r"--gamma 1\.5"):
+    with pytest.raises(UserError, match=r"gamma 1\.5"):
         make_setup("ann", gamma="1.5")

@@ -48,9 +48,9 @@ def options(field: str) -> str:
         (options("rate: float"), "--rate is missing"),
         (
             "class Odd(Fine):\n    def __init__(self, options, percept, rng):\n        self.x = {}['key']",
-            rf"cannot be made: KeyError: 'key' \(.*plugin.py, line {LINE + 2}\)",
+            rf"its constructor raised KeyError: 'key' \(.*plugin.py, line {LINE + 2}\)",
         ),
-        ("class Odd(Fine):\n    def __init__(self):\n        pass", "cannot be made: TypeError: .*argument"),
+        ("class Odd(Fine):\n    def __init__(self):\n        pass", "its constructor raised TypeError: .*argument"),
     ],
 )
 def test_an_odd_learner_is_named_in_one_line(site: Path, code: str, message: str):

@@ -1,6 +1,5 @@
 """From a command line to an agent: the same options over the bus and in one process."""
 
-import inspect
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
@@ -13,7 +12,7 @@ from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import convert, parse_groups, peek
 from phototaxis.task import TaskOptions
-from phototaxis.words import known, plain, told
+from phototaxis.words import known, plain
 
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.exploration import Exploration
@@ -58,13 +57,7 @@ class Setup(Struct):
         self._make(near=1.0, seed=0, budget=1)
 
     def _make(self, **given: Any) -> Agent:
-        try:
-            return Agent(self.learner, self.hyperparameters, self.task, self.exploration, **given)
-        except UserError:
-            raise
-        except (Exception, SystemExit) as error:
-            file = inspect.getsourcefile(find(self.learner))
-            raise UserError(f"the learner '{self.learner}' cannot be made: {told(error, file)}") from None
+        return Agent(self.learner, self.hyperparameters, self.task, self.exploration, **given)
 
 
 def presets(learner: str, percept: str) -> dict[str, Any]:
