@@ -5,12 +5,12 @@ import socket
 import sys
 
 import pytest
-from phototaxis.errors import Unavailable
+from phototaxis.errors import Unavailable, UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Control, Status, World
 from phototaxis.ports import find_ports, free_ports
 from phototaxis_agent.setup import make_setup
-from phototaxis_launcher import demo, up
+from phototaxis_launcher import demo, swap, up
 from phototaxis_launcher.cli import extra_with
 from phototaxis_launcher.places import places
 from phototaxis_launcher.progress import success
@@ -129,3 +129,16 @@ def test_a_missing_package_names_its_extra():
     assert extra_with("torch", "agent") == "agent"
     assert extra_with("fmpy", "sensors,fmu") == "sensors,fmu"
     assert extra_with("no_such_package", "lab") == "lab"
+
+
+@pytest.mark.parametrize("words", [["--checkpoint=c.npz"], ["--policy", "p.zip"], ["--take-over"], ["--worlds", "a,b"]])
+def test_the_launchers_own_agents_are_not_those_that_are_started_alone(words):
+    with pytest.raises(UserError, match=f"{words[0].split('=')[0]} is for an agent that is started alone"):
+        up.parse(words)
+
+
+def test_a_swap_says_what_delays_it():
+    assert swap.what_delays(Status("r", "running")) == ""
+    assert "phototaxis control resume" in swap.what_delays(Status("r", "paused"))
+    with pytest.raises(Unavailable, match="the run r is finished"):
+        swap.what_delays(Status("r", "finished"))

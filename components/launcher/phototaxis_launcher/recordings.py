@@ -23,9 +23,9 @@ class Options(msgspec.Struct, kw_only=True):
 
     out: str = "runs"
     """folder of the runs"""
-    max_age: Annotated[float, Meta(ge=0)] | None = None
+    max_age: Annotated[float, Meta(ge=0, examples=[30])] | None = None
     """remove recordings older than this many days"""
-    max_size: Annotated[float, Meta(ge=0)] | None = None
+    max_size: Annotated[float, Meta(ge=0, examples=[1000])] | None = None
     """keep the newest recordings up to this many megabytes together, remove the others"""
     dry_run: bool = False
     """only say what would be removed"""
