@@ -3,17 +3,20 @@
 import os
 import socket
 import sys
+from pathlib import Path
 
 import pytest
 from phototaxis.errors import Unavailable, UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Control, Status, World
 from phototaxis.ports import find_ports, free_ports
+from phototaxis.recordings import Recording, Summary
 from phototaxis_agent.setup import make_setup
 from phototaxis_launcher import demo, swap, up
 from phototaxis_launcher.cli import extra_with
 from phototaxis_launcher.places import places
 from phototaxis_launcher.progress import success
+from phototaxis_launcher.recordings import table
 from phototaxis_sim import arenas
 
 
@@ -99,6 +102,14 @@ def test_success_is_told_of_episodes_that_have_ended():
     assert told(1, 0, 0.0) == "the first episode did not reach the light"
     assert told(4, 3, 0.75) == "75% of the last 4 episodes reached the light"
     assert told(90, 50, 0.9) == "90% of the last 50 episodes reached the light"
+
+
+@pytest.mark.parametrize(
+    ("episodes", "words"), [(0, "no episode has ended"), (7, "3 of 7, last 7: 40%"), (91, "3 of 91, last 50: 40%")]
+)
+def test_a_recording_tells_success_of_episodes_that_have_ended(episodes, words):
+    summary = Summary("r", "paper", episodes=episodes, reached=min(3, episodes), recent=0.4)
+    assert words in table([Recording(Path("r.rrd"), 1, 0.0, summary)])[1]
 
 
 def test_the_end_says_how_to_look_again(tmp_path, monkeypatch):
