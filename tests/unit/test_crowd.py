@@ -107,7 +107,9 @@ def test_draws_of_many_are_draws_of_one():
 
 def test_an_evaluation_follows_from_its_seed(paper: Arena):
     agent = make_setup().agent(World("r", paper, 0, 10), learning=False)
-    first = evaluate(paper, agent, 20, seed=3, cap=30)
+    steps: list[None] = []
+    first = evaluate(paper, agent, 20, seed=3, cap=30, stepped=lambda: steps.append(None))
+    assert 0 < len(steps) <= 30
     assert first == evaluate(paper, agent, 20, seed=3, cap=30)
     assert first != evaluate(paper, agent, 20, seed=4, cap=30)
 

@@ -3,17 +3,20 @@
 import os
 import socket
 import sys
+from pathlib import Path
 
 import pytest
-from phototaxis.errors import Unavailable
+from phototaxis.errors import Unavailable, UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Control, Status, World
 from phototaxis.ports import find_ports, free_ports
+from phototaxis.recordings import Recording, Summary
 from phototaxis_agent.setup import make_setup
-from phototaxis_launcher import demo, up
+from phototaxis_launcher import demo, swap, up
 from phototaxis_launcher.cli import extra_with
 from phototaxis_launcher.places import places
 from phototaxis_launcher.progress import success
+from phototaxis_launcher.recordings import table
 from phototaxis_sim import arenas
 
 
@@ -101,6 +104,14 @@ def test_success_is_told_of_episodes_that_have_ended():
     assert told(90, 50, 0.9) == "90% of the last 50 episodes reached the light"
 
 
+@pytest.mark.parametrize(
+    ("episodes", "words"), [(0, "no episode has ended"), (7, "3 of 7, last 7: 40%"), (91, "3 of 91, last 50: 40%")]
+)
+def test_a_recording_tells_success_of_episodes_that_have_ended(episodes, words):
+    summary = Summary("r", "paper", episodes=episodes, reached=min(3, episodes), recent=0.4)
+    assert words in table([Recording(Path("r.rrd"), 1, 0.0, summary)])[1]
+
+
 def test_the_end_says_how_to_look_again(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = str(tmp_path / "my runs" / "recording.rrd")
@@ -129,3 +140,16 @@ def test_a_missing_package_names_its_extra():
     assert extra_with("torch", "agent") == "agent"
     assert extra_with("fmpy", "sensors,fmu") == "sensors,fmu"
     assert extra_with("no_such_package", "lab") == "lab"
+
+
+@pytest.mark.parametrize("words", [["--checkpoint=c.npz"], ["--policy", "p.zip"], ["--take-over"], ["--worlds", "a,b"]])
+def test_the_launchers_own_agents_are_not_those_that_are_started_alone(words):
+    with pytest.raises(UserError, match=f"{words[0].split('=')[0]} is for an agent that is started alone"):
+        up.parse(words)
+
+
+def test_a_swap_says_what_delays_it():
+    assert swap.what_delays(Status("r", "running")) == ""
+    assert "phototaxis control resume" in swap.what_delays(Status("r", "paused"))
+    with pytest.raises(Unavailable, match="the run r is finished"):
+        swap.what_delays(Status("r", "finished"))

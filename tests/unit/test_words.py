@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from msgspec import Meta
 from phototaxis.errors import UserError
-from phototaxis.options import convert, flags, parse
+from phototaxis.options import convert, flags, parse, peek
 from phototaxis.words import known, plain
 from phototaxis_lab.progress import Progress
 from phototaxis_lab.running import SEEDS
@@ -25,6 +25,8 @@ class Options(msgspec.Struct):
     name: Annotated[str, Meta(pattern="^[a-z]*$", max_length=9, description="small letters")] = "robot"
     code: Annotated[str, Meta(pattern="^[0-9]*$")] = "12"
     seeds: SEEDS = "0:20"
+    days: Annotated[float, Meta(ge=0, examples=[30])] | None = None
+    pair: Annotated[str, Meta(pattern="^[a-z]*$", description="small letters")] | None = None
     slow: bool = False
     shown: bool = True
 
@@ -39,8 +41,10 @@ class Options(msgspec.Struct):
         ("--rate much", "--rate much: expected a number, as in 0.5"),
         ("--rate 2", "--rate 2: expected a number of at most 1.0, as in 0.5"),
         ("--rate nan", "--rate nan: expected a number above 0.0, as in 0.5"),
-        ("--free nan", "--free nan: expected a finite number"),
-        ("--free inf", "--free inf: expected a finite number"),
+        ("--free nan", "--free nan: expected a finite number, as in 0.0"),
+        ("--free inf", "--free inf: expected a finite number, as in 0.0"),
+        ("--days few", "--days few: expected a number, as in 30"),
+        ("--pair a/b", "--pair a/b: expected small letters"),
         ("--name a/b", "--name a/b: expected small letters, as in robot"),
         ("--name abcdefghij", "--name abcdefghij: expected a text of at most 9 characters, as in robot"),
         ("--code a", "--code a: expected a text of another form, as in 12"),
@@ -56,6 +60,11 @@ def test_what_does_not_fit_is_told_with_an_example(words: str, line: str):
     with pytest.raises(UserError) as caught:
         parse(Options, words.split(), "prog", "", positional=["verb"])
     assert str(caught.value) == line
+
+
+def test_an_option_without_its_value_is_left_to_whoever_reads_all():
+    assert peek(["--learner"], "--learner", "qtable") == peek([], "--learner", "qtable") == "qtable"
+    assert peek(["--learner=ann", "--learner", "mirror"], "--learner", "qtable") == "mirror"
 
 
 def test_what_is_given_to_a_child_is_read_by_it_as_it_was():

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from phototaxis.bus import Bus
+from phototaxis.checkpoint import load
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.disk import try_file
 from phototaxis.errors import UserError
@@ -59,6 +60,8 @@ def read(argv: Sequence[str] | None, others: Iterable[str] = ()) -> tuple[Option
         raise UserError("--policy learns nothing: leave --checkpoint and --resume out")
     if options.normalize and not options.policy:
         raise UserError("--normalize belongs to a policy: give its file, too: --policy FILE.zip")
+    if options.resume:
+        load(Path(options.resume))
     return options, setup
 
 
@@ -71,10 +74,10 @@ def main(argv: Sequence[str] | None = None) -> None:
         try_file(file.with_suffix(".journal"), "--checkpoint")
     mode: Mode = "take over" if options.take_over else "stand by" if options.standby else "claim"
 
-    load = load_policy(Path(options.policy), options.trust, options.normalize) if options.policy else None
+    policy = load_policy(Path(options.policy), options.trust, options.normalize) if options.policy else None
 
     def make(world: World) -> Agent:
-        return load(world, setup.task.cap) if load else setup.agent(world, seed=options.agent_seed)
+        return policy(world, setup.task.cap) if policy else setup.agent(world, seed=options.agent_seed)
 
     def serve(bus: Bus) -> None:
         path = kept / f"{bus.name}.npz" if kept is not None and worlds else kept

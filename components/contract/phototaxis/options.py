@@ -126,11 +126,13 @@ def _check(item: msgspec.structs.FieldInfo, name: str, value: Any, label: str) -
 def _example(item: msgspec.structs.FieldInfo) -> str:
     """A value that fits: one of the examples in the type's `Meta`, else the default."""
     example = next((meta.examples[0] for meta in _metas(item.type) if meta.examples), item.default)
-    return f", as in {example}" if example and isinstance(example, (int, float, str)) else ""
+    return f", as in {example}" if example != "" and isinstance(example, (int, float, str)) else ""
 
 
 def _metas(kind: Any) -> list[msgspec.Meta]:
-    return [meta for meta in getattr(kind, "__metadata__", ()) if isinstance(meta, msgspec.Meta)]
+    """The conditions on a type, also on one that may be None."""
+    found = [meta for one in (kind, *typing.get_args(kind)) for meta in getattr(one, "__metadata__", ())]
+    return [meta for meta in found if isinstance(meta, msgspec.Meta)]
 
 
 class Parser(argparse.ArgumentParser):
@@ -197,10 +199,10 @@ def parse_groups(
 def peek(argv: Sequence[str], flag: str, default: str) -> str:
     """The value of one option before the rest is known (which options there are may depend on it)."""
     value = default
-    for here, following in pairwise([*argv, ""]):
-        if here == flag:
+    for here, following in pairwise([*argv, None]):
+        if here == flag and following is not None:
             value = following
-        elif here.startswith(flag + "="):
+        elif here is not None and here.startswith(flag + "="):
             value = here.partition("=")[2]
     return value
 

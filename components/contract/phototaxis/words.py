@@ -7,7 +7,6 @@ from traceback import extract_tb
 
 WORD = "letters, digits, '.', '_' and '-'"
 """The form of names on the bus."""
-WORDS = "names with commas between them, each of letters, digits, '.', '_' and '-'"
 FORM = "a text of another form"
 """What is expected of a text that a regular expression checks; the description of its type says it better."""
 

@@ -23,7 +23,7 @@ CERTS = Path("/etc/phototaxis/certs")
 class Options(BusOptions, kw_only=True):
     """Options of `phototaxis check`."""
 
-    what: Literal["agent", "rights", "wire"]
+    subject: Literal["agent", "rights", "wire"]
     """agent: a live agent, of whatever make, answers a simulation as it must. rights: who may write and read what, and
     whether a router's configuration says so. wire: whether the page about the wire format is up to date"""
     file: str = ""
@@ -42,13 +42,13 @@ class Options(BusOptions, kw_only=True):
 
 def main(argv: Sequence[str]) -> int:
     about = "Check an agent, a router's rights, or the page about the wire format against the contract."
-    options = parse(Options, argv, "phototaxis check", about, positional=["what"])
-    if options.what == "agent":
+    options = parse(Options, argv, "phototaxis check", about, positional=["subject"])
+    if options.subject == "agent":
         from phototaxis_lab.check_agent import check
 
         bus = BusOptions(**{field: getattr(options, field) for field in BusOptions.__struct_fields__})
         return check(bus, options.ticks, options.within, options.patience)
-    return _rights(options) if options.what == "rights" else _wire(options)
+    return _rights(options) if options.subject == "rights" else _wire(options)
 
 
 def _rights(options: Options) -> int:

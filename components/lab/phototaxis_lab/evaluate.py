@@ -47,13 +47,15 @@ def main(argv: Sequence[str]) -> int:
     from phototaxis_sim import arenas
 
     from phototaxis_lab.measure import SEED_OFFSET, evaluate, measure
+    from phototaxis_lab.progress import Progress
 
     path = Path(options.checkpoint)
     if is_policy(path):
         arena = arenas.enter(options.arena or "paper")
         policy = load_policy(path, options.trust, options.normalize)
-        with choose(fmus) as sensors:
-            found = measure(arena, policy.crowd(arena), options.placements, options.seed, options.cap, sensors)
+        crowd = policy.crowd(arena)
+        with choose(fmus) as sensors, Progress(options.cap, "steps") as progress:
+            found = measure(arena, crowd, options.placements, options.seed, options.cap, sensors, progress.add)
         return tell(found, {"arena": options.arena or arena.name, "arena_digest": arena.digest}, options.json)
     if options.normalize:
         raise UserError(f"{path}: --normalize belongs to a policy that Stable-Baselines3 has saved (.zip)")
@@ -62,8 +64,8 @@ def main(argv: Sequence[str]) -> int:
     setup = from_checkpoint(meta, str(path))
     agent = setup.agent(World("evaluation", arena, options.seed + SEED_OFFSET, 0), learning=False)
     agent.take_over(meta, arrays, str(path))
-    with watched(), choose(fmus) as sensors:
-        found = evaluate(arena, agent, options.placements, options.seed, options.cap, sensors)
+    with watched(), choose(fmus) as sensors, Progress(options.cap, "steps") as progress:
+        found = evaluate(arena, agent, options.placements, options.seed, options.cap, sensors, progress.add)
     place = {
         "arena": options.arena or arena.name,
         "arena_digest": arena.digest,

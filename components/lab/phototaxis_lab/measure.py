@@ -61,12 +61,22 @@ BUILT_IN = BuiltInChoice()
 
 
 def evaluate(
-    arena: Arena, agent: Agent, placements: int, seed: int, cap: int = CAP, sensors: Choice = BUILT_IN
+    arena: Arena,
+    agent: Agent,
+    placements: int,
+    seed: int,
+    cap: int = CAP,
+    sensors: Choice = BUILT_IN,
+    stepped: Callable[[], object] = lambda: None,
 ) -> Evaluation:
-    """Place `placements` robots at random, one at a place, and let the frozen agent drive each for `cap` steps."""
+    """Place `placements` robots at random, one at a place, and let the frozen agent drive each for `cap` steps.
+
+    `stepped` is called when all have made one more of them.
+    """
     if agent.learning:
         raise ValueError("an agent that is evaluated must not learn")
-    return measure(arena, CrowdAgent(agent, arena.sensing.near, placements, seed), placements, seed, cap, sensors)
+    policy = CrowdAgent(agent, arena.sensing.near, placements, seed)
+    return measure(arena, policy, placements, seed, cap, sensors, stepped)
 
 
 Policy = Callable[[CrowdReadings], np.ndarray]
@@ -74,7 +84,13 @@ Policy = Callable[[CrowdReadings], np.ndarray]
 
 
 def measure(
-    arena: Arena, policy: Policy, placements: int, seed: int, cap: int = CAP, sensors: Choice = BUILT_IN
+    arena: Arena,
+    policy: Policy,
+    placements: int,
+    seed: int,
+    cap: int = CAP,
+    sensors: Choice = BUILT_IN,
+    stepped: Callable[[], object] = lambda: None,
 ) -> Evaluation:
     """The same for any policy."""
     seed += SEED_OFFSET
@@ -89,6 +105,7 @@ def measure(
             break
         left, right = np.where(steps < 0, policy(readings).T, 0.0)
         crowd.drive(left, right)
+        stepped()
     reached = steps >= 0
     bounds = np.array([direct_steps(arena, start) for start in starts])
     return Evaluation(

@@ -37,4 +37,5 @@ def main(argv: Sequence[str]) -> int:
                     continue
                 if options.role != "sim" or bus.control(Control("status")) is not None:
                     return 0
-    raise Unavailable(f"no {options.role} {options.id} answers on the bus of '{options.name}'")
+    who = f"{options.role} {options.id}".rstrip()
+    raise Unavailable(f"no {who} answers on the bus of '{options.name}'")

@@ -23,9 +23,9 @@ class Options(msgspec.Struct, kw_only=True):
 
     out: str = "runs"
     """folder of the runs"""
-    max_age: Annotated[float, Meta(ge=0)] | None = None
+    max_age: Annotated[float, Meta(ge=0, examples=[30])] | None = None
     """remove recordings older than this many days"""
-    max_size: Annotated[float, Meta(ge=0)] | None = None
+    max_size: Annotated[float, Meta(ge=0, examples=[1000])] | None = None
     """keep the newest recordings up to this many megabytes together, remove the others"""
     dry_run: bool = False
     """only say what would be removed"""
@@ -86,7 +86,8 @@ def table(found: list[Recording]) -> list[str]:
     for file, size, _, summary in found:
         known = ("?",) * 5
         if summary is not None:
-            success = f"{summary.reached} of {summary.episodes}, last 50: {summary.recent:.0%}"
+            newest = f"{summary.reached} of {summary.episodes}, last {min(summary.episodes, 50)}: {summary.recent:.0%}"
+            success = newest if summary.episodes else "no episode has ended"
             arena = summary.arena if names[summary.arena] == 1 else f"{summary.arena} ({summary.arena_digest[:4]})"
             known = (summary.run, arena, ", ".join(summary.drivers), str(summary.epochs), success)
         rows.append((str(file), *known, f"{size / MEGABYTE:.1f}"))

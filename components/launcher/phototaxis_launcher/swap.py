@@ -8,9 +8,11 @@ from typing import Annotated
 from msgspec import Meta
 from phototaxis.bus import Bus
 from phototaxis.errors import Unavailable, UserError
-from phototaxis.messages import Launch, LaunchReply
+from phototaxis.messages import Control, Launch, LaunchReply, Status
 from phototaxis.options import Parser, add_options, convert
 from phototaxis.session import BusOptions, open_session
+
+from phototaxis_launcher.up import for_ours
 
 LINKED_WITHIN = 2.0
 
@@ -35,7 +37,7 @@ def main(argv: Sequence[str]) -> int:
     add_options(parser, Options, positional=["learner"])
     own, words = parser.parse_known_args(argv)
     options = convert(Options, vars(own))
-    reply = _ask(options, Launch(["--learner", options.learner, *words]))
+    reply = _ask(options, Launch(["--learner", options.learner, *for_ours(words)]))
     if reply.reason:
         raise UserError(reply.reason)
     if options.json:
@@ -52,9 +54,26 @@ def _ask(options: Options, request: Launch) -> LaunchReply:
                 f"no `phototaxis up` runs the world '{options.name}'; start the agent yourself: "
                 f"phototaxis agent --learner {options.learner} --take-over"
             )
+        now = bus.control(Control("status"))
+        if now is not None and (delay := what_delays(now.status)):
+            print(delay, file=sys.stderr)
         reply = bus.ask_one("launch", request, timeout=options.within)
     if reply is None:
         raise Unavailable(
             f"the new agent did not take the seat within {options.within:g} s; see its log in the run's folder"
         )
     return reply
+
+
+def what_delays(status: Status) -> str:
+    """Why a new agent does not drive at once, in words; "" when nothing keeps it.
+
+    Raises
+    ------
+    Unavailable
+        when it never drives, since the run is finished.
+    """
+    if status.phase == "finished":
+        raise Unavailable(f"the run {status.run} is finished: nobody takes its seat any more")
+    resume = "the simulation is paused; the new agent drives when it goes on: phototaxis control resume"
+    return resume if status.phase == "paused" else ""

@@ -31,6 +31,8 @@ from phototaxis_launcher.show import Show
 PORT = Annotated[int, Meta(ge=-1, le=65535)]
 PATIENCE = {"recorder": 60.0, "agent": 15.0, "sensors": 5.0, "sim": 5.0}
 """Seconds that a component gets to end; also the order in which they are ended."""
+ALONE = ("--checkpoint", "--policy", "--standby", "--take-over", "--at", "--worlds", "--ident")
+"""Options of an agent that is started alone; the launcher gives its own agents theirs."""
 SWAPS = re.compile(r"(?P<tick>[0-9]+):(?P<learner>[^:,\s]+)")
 ANSWERED_WITHIN = 5.0
 """Seconds that the simulation gets to pause, and the driver to answer the last tick of a run that is stopped."""
@@ -419,6 +421,14 @@ def swap_plan(text: str) -> list[tuple[int, str]]:
     return plan
 
 
+def for_ours(words: list[str]) -> list[str]:
+    """Words for an agent that the launcher starts; UserError when one is for an agent that is started alone."""
+    for word in words:
+        if (option := word.split("=")[0]) in ALONE:
+            raise UserError(f"{option} is for an agent that is started alone, beside a run: phototaxis agent {option}")
+    return words
+
+
 def _learner(words: Sequence[str]) -> str:
     return peek(words, "--learner", "qtable")
 
@@ -438,7 +448,7 @@ def parse(argv: Sequence[str], prog: str = "phototaxis up") -> tuple[UpOptions, 
         raise UserError(f"--listen is for single components; {prog} links its own, or uses a router with --connect")
     for learner in {_learner(words), *(learner for _, learner in swap_plan(options.swap))}:
         import_module("phototaxis_agent.__main__").read(successor(words, ["--learner", learner]), parser.option_strings)
-    return options, convert(FmuOptions, vars(own)), words
+    return options, convert(FmuOptions, vars(own)), for_ours(words)
 
 
 def main(argv: Sequence[str]) -> int:
