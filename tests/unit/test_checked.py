@@ -24,6 +24,7 @@ from phototaxis_agent.agent import Agent
 from phototaxis_agent.crowd import CrowdAgent
 from phototaxis_agent.exploration import Exploration
 from phototaxis_agent.learner import Learner, discrete
+from phototaxis_agent.learners.qtable import QTable
 from phototaxis_agent.setup import make_setup
 from phototaxis_agent.stuck import watched
 from phototaxis_lab.loop import Loop
@@ -348,10 +349,10 @@ def test_a_constructor_that_does_not_return_is_named(monkeypatch, capfd: pytest.
         while "has not returned" not in said and time.monotonic() < deadline:
             said += capfd.readouterr().err
             time.sleep(0.01)
-        Table.__init__(self, options, percept, rng)
+        QTable.__init__(self, options, percept, rng)
 
     setup = make_setup()
-    monkeypatch.setattr(module, "find", lambda _: type("Theirs", (Table,), {"__init__": slow}))
+    monkeypatch.setattr(module, "find", lambda _: type("Theirs", (QTable,), {"__init__": slow}))
     monkeypatch.setattr("phototaxis_agent.setup.watched", lambda: watched(0.05))
     setup.check()
     assert "learner qtable: __init__() has not returned" in said
