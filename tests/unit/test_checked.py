@@ -24,6 +24,8 @@ from phototaxis_agent.agent import Agent
 from phototaxis_agent.crowd import CrowdAgent
 from phototaxis_agent.exploration import Exploration
 from phototaxis_agent.learner import Learner, discrete
+from phototaxis_agent.learners.qtable import QTable
+from phototaxis_agent.setup import make_setup
 from phototaxis_agent.stuck import watched
 from phototaxis_lab.loop import Loop
 from phototaxis_lab.measure import evaluate
@@ -147,7 +149,14 @@ def test_values_that_are_none_name_learner_state_and_step(make, name):
     assert text.endswith("; tick 2, learning step 2, state (2, 0, 0, 0)")
 
 
-@pytest.mark.parametrize("given", [None, math.nan, 1j, "much", [1.0, 2.0]], ids=str)
+class Speechless:
+    def __repr__(self) -> str:
+        raise RuntimeError
+
+
+@pytest.mark.parametrize(
+    "given", [None, math.nan, 1j, "much", [1.0, 2.0], Speechless()], ids=lambda one: type(one).__name__
+)
 def test_an_error_that_is_no_number_is_told(make, given):
     text = line(make(learn=lambda self, step: given))
     assert "learn() gave" in text
@@ -162,6 +171,17 @@ def leave(*_: object) -> Any:
     raise SystemExit(0)
 
 
+class Leaving(BaseException):
+    """No `Exception`, as the cancelling errors of some libraries; it cannot even say what it is."""
+
+    def __str__(self) -> str:
+        raise RuntimeError
+
+
+def cancel(*_: object) -> Any:
+    raise Leaving
+
+
 @pytest.mark.parametrize("method", ["values", "learn", "remember"])
 def test_what_it_raises_is_told_with_its_file_and_line(make, method):
     text = line(make(**{method: fail}))
@@ -169,6 +189,9 @@ def test_what_it_raises_is_told_with_its_file_and_line(make, method):
     assert f"{HERE}, line {fail.__code__.co_firstlineno + 1})" in text
     assert "state (2, 0, 0, 0)" in text
     assert f"{method}() called sys.exit(0)" in line(make(**{method: leave}))
+    assert f"{method}() raised Leaving: <Leaving> ({cancel.__code__.co_filename}, line " in line(
+        make(**{method: cancel})
+    )
 
 
 def test_it_fails_before_the_run_when_it_cannot_be_made_or_saved(make):
@@ -186,6 +209,7 @@ def test_it_fails_before_the_run_when_it_cannot_be_made_or_saved(make):
         ({"save": fail}, "save() raised KeyError"),
         ({"load": fail}, "load() raised KeyError"),
         ({"load": lambda self, arrays: int("x")}, "load() does not take what save() gave: invalid literal"),
+        ({"context": property(fail)}, "its context raised KeyError"),
         ({"context": [1.0]}, "its context is [1.0]; expected a tuple"),
         ({"context": (math.nan,)}, "its context gave nan"),
     ):
@@ -312,8 +336,26 @@ def test_a_learner_that_does_not_return_is_named(make, capfd: pytest.CaptureFixt
 
     with watched(0.05):
         drive(make(learn=slow), 2)
-    assert said.startswith("learner theirs: learn() has not returned for 0.05 s (")
+    assert said.startswith("phototaxis: warning: learner theirs: learn() has not returned for 0.05 s (")
     assert HERE in said
+
+
+def test_a_constructor_that_does_not_return_is_named(monkeypatch, capfd: pytest.CaptureFixture[str]):
+    said = ""
+
+    def slow(self, options, percept, rng):
+        nonlocal said
+        deadline = time.monotonic() + 20
+        while "has not returned" not in said and time.monotonic() < deadline:
+            said += capfd.readouterr().err
+            time.sleep(0.01)
+        QTable.__init__(self, options, percept, rng)
+
+    setup = make_setup()
+    monkeypatch.setattr(module, "find", lambda _: type("Theirs", (QTable,), {"__init__": slow}))
+    monkeypatch.setattr("phototaxis_agent.setup.watched", lambda: watched(0.05))
+    setup.check()
+    assert "learner qtable: __init__() has not returned" in said
 
 
 def test_the_process_of_whoever_embeds_a_learner_is_left_as_it_is(paper: Arena):

@@ -118,7 +118,7 @@ def test_the_end_says_how_to_look_again(tmp_path, monkeypatch):
     lines = places({"recording": file, "checkpoint": None, "drivers": [{"driver": "stranger-1"}]})
     assert lines[0].endswith(file)
     assert lines[1].endswith("phototaxis view 'my runs/recording.rrd'")
-    assert lines[2] == "checkpoint  none: stranger-1 drove last, and was not started here"
+    assert lines[2] == "checkpoint  none: stranger-1 drove last, and saved none here"
     assert not any("http" in line for line in lines), "the address is dead by then"
 
 

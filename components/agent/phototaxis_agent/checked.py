@@ -48,7 +48,7 @@ class CheckedLearner(Learner):
         self._options, self._percept, self._actions = options, percept, len(percept.actions)
         self._learner = self._call("its constructor", None, lambda: kind(options, percept, rng))
         self._remembers = kind.remember is not Learner.remember
-        self.context = self._context("its context", self._learner.context)
+        self.context = self._context("its context", self._call("its context", None, lambda: self._learner.context))
         self._give_back(self, self.save())
 
     def seen_from(self, where: Callable[[], str]) -> "CheckedLearner":
@@ -60,7 +60,7 @@ class CheckedLearner(Learner):
     def values(self, state: State) -> list[float]:
         try:
             values = self._learner.values(state)
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             self._raised("values()", error, state)
         if type(values) is list and len(values) == self._actions and _plain(values):
             return values
@@ -69,7 +69,7 @@ class CheckedLearner(Learner):
     def learn(self, transition: Transition) -> float:
         try:
             error = self._learner.learn(transition)
-        except (Exception, SystemExit) as raised:
+        except BaseException as raised:
             self._raised("learn()", raised, transition.state)
         if type(error) is float and error - error == 0.0:
             return error
@@ -80,7 +80,7 @@ class CheckedLearner(Learner):
             return ()
         try:
             context = self._learner.remember(state, action, gain)
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             self._raised("remember()", error, state)
         if not isinstance(context, tuple) or len(context) != len(self.context):
             expected = f"a tuple of {len(self.context)} values, as many as its context has"
@@ -117,7 +117,7 @@ class CheckedLearner(Learner):
             self._learner.load({name: array.copy() for name, array in arrays.items()})
         except ValueError as error:
             raise ValueError(" ".join(str(error).split())) from error
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             self._raised("load()", error)
         if learner_hash(self.save()) != learner_hash(arrays):
             self._broken("load() does not bring back what save() gave: saved again, it is something else")
@@ -138,7 +138,7 @@ class CheckedLearner(Learner):
     def _call(self, what: str, state: Any, call: Callable[[], T]) -> T:
         try:
             return call()
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             self._raised(what, error, state)
 
     def _context(self, what: str, context: Any, state: Any = None) -> tuple[float, ...]:
@@ -170,9 +170,9 @@ class CheckedLearner(Learner):
         return array.reshape(shape)
 
     def _raised(self, what: str, error: BaseException, state: Any = None) -> NoReturn:
-        if isinstance(error, UserError):
+        if isinstance(error, (UserError, KeyboardInterrupt)):
             raise error
-        said = " ".join(str(error).split())[:500]
+        said = " ".join(_words(str, error).split())[:500]
         text = f"called sys.exit({said})" if isinstance(error, SystemExit) else f"raised {type(error).__name__}: {said}"
         self._broken(f"{what} {text.removesuffix(': ')} ({self._place(error)})", state, error)
 
@@ -206,8 +206,16 @@ def _array(value: Any) -> np.ndarray:
 
 def _described(value: Any) -> str:
     """A value in a few words."""
-    text = " ".join(repr(value).split())
+    text = " ".join(_words(repr, value).split())
     return text if len(text) <= 60 else f"{text[:60]}… ({type(value).__name__})"
+
+
+def _words(tell: Callable[[Any], str], value: Any) -> str:
+    """What `str` or `repr` tells of a value; nothing but its type when it cannot be told."""
+    try:
+        return tell(value)
+    except Exception:  # whatever an object of somebody's library raises
+        return f"<{type(value).__name__}>"
 
 
 def _amount(shape: tuple[int, ...]) -> str:

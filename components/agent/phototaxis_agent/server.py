@@ -111,11 +111,11 @@ class Server:
         with watched():
             while not self._replaced and self._handle(self._bus.receive(timeout=0.05)):
                 pass
-        self._log.flush()
-        if self._session is not None:
-            self._bus.control(Control("release", self._bus.ident), timeout=0.5)
-            if fault := self._save(self._session.agent, last=True):
-                raise fault
+            self._log.flush()
+            if self._session is not None:
+                self._bus.control(Control("release", self._bus.ident), timeout=0.5)
+                if fault := self._save(self._session.agent, last=True):
+                    raise fault
 
     def _handle(self, event: Event | None) -> bool:
         """Do what one event asks for; False when it is to stop."""

@@ -17,6 +17,7 @@ from phototaxis.words import known, plain
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.exploration import Exploration
 from phototaxis_agent.learner import find
+from phototaxis_agent.stuck import watched
 
 
 class LearnerOptions(Struct, kw_only=True):
@@ -57,7 +58,8 @@ class Setup(Struct):
         self._make(near=1.0, seed=0, budget=1)
 
     def _make(self, **given: Any) -> Agent:
-        return Agent(self.learner, self.hyperparameters, self.task, self.exploration, **given)
+        with watched():
+            return Agent(self.learner, self.hyperparameters, self.task, self.exploration, **given)
 
 
 def presets(learner: str, percept: str) -> dict[str, Any]:

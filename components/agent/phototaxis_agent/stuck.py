@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from phototaxis.errors import warn
+
 from phototaxis_agent import checked
 
 WITHIN = 10.0
@@ -15,7 +17,7 @@ WITHIN = 10.0
 
 @contextmanager
 def watched(within: float = WITHIN) -> Iterator[None]:
-    """Tell on stderr, once, which method of a learner this thread has been in for `within` seconds."""
+    """Warn on stderr, once, which method of a learner this thread has been in for `within` seconds."""
     over = threading.Event()
     thread = threading.Thread(target=_watch, args=(threading.get_ident(), over, within), daemon=True)
     thread.start()
@@ -35,7 +37,7 @@ def _watch(ident: int, over: threading.Event, within: float) -> None:
             seen, since, told = call, time.monotonic(), False
         elif not told and time.monotonic() - since >= within:
             told = True
-            print(_line(call, now or call, within), file=sys.stderr, flush=True)
+            warn(_line(call, now or call, within))
 
 
 def _learner_call(frame: FrameType | None) -> FrameType | None:

@@ -5,6 +5,7 @@ import secrets
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
@@ -15,7 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from phototaxis.bus import Bus
-from phototaxis.errors import UserError, leave, one_line
+from phototaxis.errors import ComponentFailed, UserError, leave, one_line
 from phototaxis.session import BusOptions, open_session, place, reaching
 from phototaxis.words import WORD
 
@@ -26,6 +27,8 @@ WAITS_FOR = {
     "recorder": "a simulation, its sensors and an agent",
 }
 """Whom a component needs before anything happens, by its role."""
+ORDERLY = 60.0
+"""Seconds that a component gets to end in good order when the process that it is tethered to is gone."""
 
 
 class ComponentOptions(BusOptions, kw_only=True):
@@ -100,9 +103,12 @@ def made_up(label: str, word: str = "") -> str:
 
 
 def _hold_tether(stop: Callable[[], None]) -> None:
+    """Leave when standard input closes: in good order, or without it when code of others does not return."""
     while os.read(sys.stdin.fileno(), 4096):
         pass
     stop()
+    time.sleep(ORDERLY)  # a process that ends in the meantime does not wait for this thread
+    os._exit(ComponentFailed.exit_code)
 
 
 def entry(body: Callable[[], None]) -> None:

@@ -9,6 +9,7 @@ from phototaxis.messages import World
 from phototaxis.task import ACTIONS
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.setup import Setup, make_setup
+from phototaxis_agent.stuck import watched
 from phototaxis_sim import arenas
 
 from phototaxis_lab.loop import Loop
@@ -112,6 +113,7 @@ def learn(cell: Cell) -> Learned:
     return Learned(agent, loop, rewards, speeds)
 
 
+@watched()
 def run(cell: Cell) -> Outcome:
     """Learn, freeze, measure on 200 fresh placements; everything follows from the cell."""
     agent, loop, rewards, speeds = learn(cell)

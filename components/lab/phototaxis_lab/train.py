@@ -68,13 +68,13 @@ def one(options: Options, setup: Any, arena: Any, make: Any) -> tuple[dict[str, 
     with watched():
         loop, seconds = train(setup, arena, options.seed, options.epochs, make)
         meta, arrays = loop.agent.checkpoint()
-    kept, fault = options.checkpoint or None, None
-    try:
-        if kept:
-            loop.agent.learner.prove(arrays)
-            save(Path(kept), meta, arrays)
-    except UserError as error:
-        kept, fault = None, error
+        kept, fault = options.checkpoint or None, None
+        try:
+            if kept:
+                loop.agent.learner.prove(arrays)
+                save(Path(kept), meta, arrays)
+        except UserError as error:
+            kept, fault = None, error
     simulation = loop.simulation
     found = {
         "arena": options.arena,

@@ -16,7 +16,7 @@ def places(result: dict[str, Any]) -> list[str]:
     if checkpoint := result["checkpoint"]:
         lines += [f"checkpoint  {checkpoint}", f"            measure it: {program()} evaluate {shown(checkpoint)}"]
     elif drivers := result["drivers"]:
-        lines.append(f"checkpoint  none: {drivers[-1]['driver']} drove last, and was not started here")
+        lines.append(f"checkpoint  none: {drivers[-1]['driver']} drove last, and saved none here")
     return lines
 
 
