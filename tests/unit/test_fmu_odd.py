@@ -194,7 +194,7 @@ def test_which_steps_an_fmu_gets(fmu: Built, tmp_path: Path, interface, step, pe
 
 
 def test_a_step_that_is_no_length_is_refused(fmu: Built):
-    with pytest.raises(UserError, match="the control period, 0.5 s, is no whole number of such steps"):
+    with pytest.raises(UserError, match=r"the control period, 0.5 s, is no whole number of such steps"):
         pace(read(str(fmu("lag", 2))).description, 0.5, 1e-320)
 
 

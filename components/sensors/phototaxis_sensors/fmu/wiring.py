@@ -198,7 +198,7 @@ def _wire(fmu: Fmu, port: Port, variable: ModelVariable) -> Wire:
     base = definition.baseUnit
     factor, offset = base.factor, 0.0 if variable.relativeQuantity else base.offset
     if not factor or not all(map(math.isfinite, (factor, 1 / factor, offset / factor))):
-        raise UserError(f"{fmu.file}: the unit of {variable.name}, {unit}, has the factor {factor:g}, offset {offset:g}")
+        raise UserError(f"{fmu.file}: the unit of {variable.name}, {unit}, has factor {factor:g}, offset {offset:g}")
     return Wire(port.name, variable, 1 / factor, -offset / factor)
 
 
