@@ -556,11 +556,11 @@ def test_an_invalid_description_is_used_on_request(fmu: Built, tmp_path: Path, s
     with pytest.raises(UserError, match="cannot be used"):
         sensors(light_fmu=str(broken), allow_invalid=True)
     variable = 'canHandleVariableCommunicationStepSize="true"'
-    for version, number, word in (
-        (2, 'min="0.0"', 'min="nought"'),
-        (3, variable, f'fixedInternalStepSize="nought" {variable}'),
+    for source, number, word in (
+        (fmu("lag", 2), 'min="0.0"', 'min="nought"'),
+        (fmu("lag", 3), variable, f'fixedInternalStepSize="nought" {variable}'),
     ):
-        words = described(fmu("lag", version), tmp_path / "c.fmu", number, word)
+        words = described(source, tmp_path / "c.fmu", number, word)
         with pytest.raises(UserError, match="cannot be used: could not convert string to float: 'nought'"):
             sensors(light_fmu=str(words), allow_invalid=True)
 
