@@ -198,6 +198,18 @@ def test_nobody_there(world):
         gymnasium.make(NAME, connect="tcp/127.0.0.1:1", timeout=0.3)
 
 
+@pytest.mark.parametrize("name", ["zenoh.json5", "zenoh.json", "zenoh.yaml", "zenoh.yml"])
+def test_every_form_of_zenohs_files_is_known(name, world, tmp_path, monkeypatch):
+    file = tmp_path / name
+    file.write_text('{"mode": "client"}')
+    with pytest.raises(Error, match=f"{name}: names no endpoint"):
+        gymnasium.make(NAME, connect=str(file), world=world)
+    file.write_text('{"mode": "peer", "listen": {"endpoints": ["tcp/127.0.0.1:0"]}}')
+    monkeypatch.setenv("ZENOH_CONFIG", str(file))
+    with pytest.raises(Error, match=f"in the world '{world}' through .*{name}; start one"):
+        gymnasium.make(NAME, connect="local", world=world, timeout=0.1)
+
+
 @pytest.mark.parametrize("role", ["sim", "sensors"])
 def test_a_killed_component_is_an_error_and_no_hang(system, world, role):
     environment = gymnasium.make(NAME, connect="local", world=world, timeout=1.5)

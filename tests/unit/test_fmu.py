@@ -138,6 +138,10 @@ def test_names_units_and_parameters(fmu: Built, paper: Arena, sensors, tmp_path:
     seconds = described(fmu("light", 3), tmp_path / "d.fmu", 'unit="m"', 'unit="s"')
     with pytest.raises(UserError, match="the unit of distance, s, cannot be converted from m"):
         sensors(light_fmu=str(seconds))
+    for factor in ("0", "NaN", "INF", "1e-320"):
+        odd = described(cm, tmp_path / "e.fmu", 'factor="0.01"', f'factor="{factor}"')
+        with pytest.raises(UserError, match="the unit of d, cm, has factor"):
+            sensors(light_fmu=str(odd), fmu_map=["distance=d"])
     with pytest.raises(UserError, match="has no parameter 'tau'; its parameters are range"):
         sensors(light_fmu=str(fmu("light", 3)), fmu_param=["tau=1"])
     with pytest.raises(UserError, match=r"--fmu-param half=-1: out of its range 1e-06 to inf"):

@@ -101,7 +101,7 @@ def copied(by: Callable[[Any], Any]) -> Case:
     return case
 
 
-def limit_of_steps(steps: int, tried: int, **options: Any) -> Case:
+def limit_of_steps(steps: Any, tried: int, **options: Any) -> Case:
     """Which of the steps truncates; actions that neither terminate CartPole's episode nor ours so soon."""
 
     def case(make: Callable[..., Any]) -> Any:
@@ -142,7 +142,7 @@ ONE = {
     "an unknown option": calls("reset", nonsense=1),
     "an unknown reset option": reset_with(options={"nonsense": 1}),
     "reset options of no kind": reset_with(options=3),
-    "max_episode_steps": limit_of_steps(4, 4),
+    **{f"max_episode_steps {steps!r}": limit_of_steps(steps, 4) for steps in (4, None, -1, 0, -2, 2.5, "4")},
 }  # fmt: skip
 
 MANY = {
@@ -170,7 +170,7 @@ MANY = {
     "step after close": calls("reset", "close", "step"),
     "no checker": calls("reset", "step", disable_env_checker=True),
     "an unknown option": calls("reset", nonsense=1),
-    "max_episode_steps": limit_of_steps(4, 4),
+    **{f"max_episode_steps {steps!r}": limit_of_steps(steps, 4) for steps in (4, None, -1, 0, -2, 2.5, "4")},
 }  # fmt: skip
 
 

@@ -15,5 +15,9 @@ class WrongSeeds(Error, ValueError):
     """There are more or fewer seeds than robots."""
 
 
+class WrongSteps(Error, ValueError):
+    """An episode would have no steps; `gymnasium.make` raises ValueError for it."""
+
+
 class EpisodeOver(ResetNeeded, AssertionError):
     """A robot whose episode has ended was stepped with `AutoresetMode.DISABLED`; SyncVectorEnv asserts the same."""

@@ -82,7 +82,8 @@ def wrapped(space: Any, arena: Arena) -> str:
             continue
         count = int(np.prod(shape))
         (size,) = ours.shape
-        if shape[-1] % size == 0 and count > size:
+        stacks = shape[-1] % size == 0 and count > size
+        if stacks and np.array_equal(np.sort(space.high, axis=None), np.sort(np.tile(ours.high, count // size))):
             return f" ({count // size} frames of {name} stacked? policies of stacked frames are not supported)"
         if shape == ours.shape and not np.isfinite(space.high).all():
             return f" ({name} through NormalizeObservation? train through VecNormalize, whose statistics can be saved)"

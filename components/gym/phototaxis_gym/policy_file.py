@@ -105,8 +105,16 @@ def normalizer(file: Path, trusted: bool, model: Any) -> Normalize:
 
 
 def was_normalized(model: Any) -> bool:
-    """Whether the training went through VecNormalize, unless its last observation proves to be the environment's."""
+    """Whether the training went through VecNormalize, as far as its last observations tell.
+
+    Those with a replay buffer keep the observation before the last one as the original where nothing is normalised.
+    So what tells of theirs is whether the environment can give the last one.
+    """
+    from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+
     seen, original = model._last_obs, model._last_original_obs
+    if isinstance(model, OffPolicyAlgorithm):
+        return seen is not None and not all(map(model.observation_space.contains, seen))
     return original is not None and not np.array_equal(seen, original)
 
 

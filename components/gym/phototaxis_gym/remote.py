@@ -15,10 +15,12 @@ from phototaxis.component import made_up
 from phototaxis.errors import UserError
 from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, World
 from phototaxis.options import convert
-from phototaxis.session import BusOptions, open_session
+from phototaxis.session import BusOptions, open_session, place
 from phototaxis.task import CrowdReadings
 from phototaxis_sim.physics import Pose
 
+FILES = (".json5", ".json", ".yaml", ".yml")
+"""How the names of Zenoh's configuration files end."""
 SEEK_EVERY = 0.2
 FOLLOW = "behind the bus the robots' seeds are S, S + 1, S + 2, …"
 
@@ -29,7 +31,7 @@ class Link:
     Parameters
     ----------
     connect : "local" for the sockets of this machine, a Zenoh endpoint as tcp/HOST:7447, or a Zenoh
-        configuration file (.json5) for a guarded router.
+        configuration file (.json5, .json, .yaml) for a guarded router.
     world : name of the world on the bus.
     timeout : seconds to wait for an answer.
 
@@ -41,15 +43,16 @@ class Link:
 
     def __init__(self, connect: str, world: str, timeout: float):
         self._present: set[str] = set()
-        self._timeout, self._where = timeout, f"the world '{world}' ({connect})"
+        self._timeout = timeout
         try:
             options = convert(BusOptions, {"name": world})
         except UserError:
             raise Error(f"world '{world}': up to 40 letters, digits, '_', '.' and '-'") from None
-        if connect.endswith(".json5"):
+        if connect.endswith(FILES):
             options.zenoh_config = connect
         elif connect != "local":
             options.connect = [connect]
+        self._where = f"the world '{world}' {place(options)}"
         ident = made_up("gymnasium")
         with ExitStack() as stack:
             try:

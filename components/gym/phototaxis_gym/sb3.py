@@ -31,11 +31,13 @@ class Robots(VecEnv):
         self._actions: Any = None
 
     def reset(self) -> Any:
-        """The first observations; the seeds of a call of `seed` are used once."""
+        """The first observations; what `seed` and `set_options` were given is used once."""
         seeds = None if None in self._seeds else self._seeds
-        seen, info = self.robots.reset(seed=seeds)
+        poses = [one["pose"] for one in self._options if "pose" in one]
+        seen, info = self.robots.reset(seed=seeds, options={"pose": poses} if poses else None)
         self.reset_infos = rows(info, self.num_envs)
         self._reset_seeds()
+        self._reset_options()
         return seen
 
     def step_async(self, actions: np.ndarray) -> None:

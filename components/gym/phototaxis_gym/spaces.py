@@ -10,7 +10,7 @@ from gymnasium.vector.utils import iterate
 from phototaxis.arena import Arena
 from phototaxis.task import ACTIONS, OWN_REWARD, PERCEPTS, REWARDS, Percept, Reward
 
-from phototaxis_gym.errors import WrongAction, WrongCount
+from phototaxis_gym.errors import WrongAction, WrongCount, WrongSteps
 
 ROUNDING = 1e-6
 """How far a wheel command may lie outside of −1..1: what arithmetic in float32 makes of ±1. It is clipped."""
@@ -173,14 +173,18 @@ def _numbers(action: Any) -> np.ndarray:
     return given.astype(float) if given.dtype.kind in "biuf" else np.empty(0)
 
 
-def valid_cap(cap: int) -> int:
-    """The steps of an episode, at least one.
+def valid_cap(cap: int, option: str = "cap") -> int:
+    """The steps of an episode, at least one; `option` names what they were given as.
 
     Raises
     ------
-    gymnasium.error.Error
-        for fewer.
+    TypeError
+        for what is no whole number.
+    WrongSteps
+        for fewer than one.
     """
+    if not isinstance(cap, int | np.integer):
+        raise TypeError(f"{option} {cap!r}: a whole number of steps is needed")
     if cap < 1:
-        raise Error(f"cap {cap}: an episode has at least one step")
+        raise WrongSteps(f"{option} {cap}: an episode has at least one step")
     return cap

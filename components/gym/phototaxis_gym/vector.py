@@ -35,7 +35,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
 
     Parameters
     ----------
-    max_episode_steps : steps after which an episode is truncated; −1 for no limit. `cap` takes the
+    max_episode_steps : steps after which an episode is truncated; −1 for no limit, None for 300. `cap` takes the
         place of the usual 300, and lowers any other.
     render_mode : None, "rgb_array" (`render` returns one picture for each robot) or "human" (all in one window).
     autoreset_mode : what becomes of a robot whose episode has ended. NEXT_STEP: the next step places it anew and
@@ -63,7 +63,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         connect: str = "",
         world: str = "phototaxis",
         timeout: float = 10.0,
-        max_episode_steps: int = CAP,
+        max_episode_steps: int | None = CAP,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         disable_env_checker: bool | None = None,
     ):
@@ -75,8 +75,10 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
             raise Error(f"no render_mode '{render_mode}' for many robots; there are: {', '.join(modes)}")
         if num_envs < 1:
             raise Error(f"num_envs {num_envs}: at least one robot is needed")
-        if max_episode_steps < 1 and max_episode_steps != -1:
-            raise Error(f"max_episode_steps {max_episode_steps}: at least one step, or -1 for no limit")
+        if max_episode_steps is None:
+            max_episode_steps = CAP
+        elif max_episode_steps != -1:
+            valid_cap(max_episode_steps, "max_episode_steps")
         usual = cap is not None and max_episode_steps == CAP
         limit = np.inf if max_episode_steps == -1 or usual else max_episode_steps
         self.num_envs, self._cap = num_envs, limit if cap is None else min(valid_cap(cap), limit)

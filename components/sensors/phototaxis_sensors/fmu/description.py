@@ -148,8 +148,9 @@ def _describe(path: str, allow_invalid: bool) -> ModelDescription:
 
 def _sound(description: ModelDescription) -> ModelDescription:
     """A description that no schema has approved; raises ValueError where what is used of it is no number."""
-    experiment = description.defaultExperiment
+    experiment, interface = description.defaultExperiment, description.coSimulation
     numbers = [experiment.stepSize] if experiment is not None else []
+    numbers += [interface.fixedInternalStepSize] if interface is not None else []
     for one in (*description.modelVariables, *description.typeDefinitions):
         numbers += [one.min, one.max]
     for number in numbers:

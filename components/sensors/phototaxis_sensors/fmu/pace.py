@@ -1,5 +1,6 @@
 """How often an FMU is stepped in a control period."""
 
+import math
 from typing import NamedTuple
 
 from fmpy.model_description import ModelDescription
@@ -41,15 +42,17 @@ def pace(description: ModelDescription, period: float, asked: float) -> Pace:
     if own and 0 < (times := _fits(own, period)) <= MOST:
         return Pace(own, times)
     wish = own or suggested
-    if wish in (0.0, period):
+    fitting = _fits(wish, period) if wish else 1
+    if fitting == 1:
         return Pace(period, 1)
     words = "has" if own else "suggests"
     remark = f"{words} steps of {wish:g} s; it gets steps of {period:g} s, the control period"
-    hint = f" (--fmu-step {wish:g} gives it its own)" if _fits(wish, period) else ""
+    hint = f" (--fmu-step {wish} gives it its own)" if 0 < fitting <= MOST else ""
     return Pace(period, 1, remark + hint)
 
 
 def _fits(step: float, period: float) -> int:
-    """How many such steps are the period; 0 when it is no whole number of them."""
-    times = round(period / step)
+    """How many such steps are the period; 0 when it is no whole number of them, or the step is no length."""
+    ratio = period / step
+    times = round(ratio) if 0 < ratio < math.inf else 0
     return times if abs(times * step - period) <= 1e-9 * period else 0

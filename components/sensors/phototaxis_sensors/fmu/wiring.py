@@ -195,8 +195,11 @@ def _wire(fmu: Fmu, port: Port, variable: ModelVariable) -> Wire:
     dimensions = {port.unit: 1} if port.unit == "m" else {}
     if definition is None or definition.baseUnit is None or _dimensions(definition) != dimensions:
         raise UserError(f"{fmu.file}: the unit of {variable.name}, {unit}, cannot be converted from {port.unit}")
-    offset = 0.0 if variable.relativeQuantity else definition.baseUnit.offset
-    return Wire(port.name, variable, 1 / definition.baseUnit.factor, -offset / definition.baseUnit.factor)
+    base = definition.baseUnit
+    factor, offset = base.factor, 0.0 if variable.relativeQuantity else base.offset
+    if not factor or not all(map(math.isfinite, (factor, 1 / factor, offset / factor))):
+        raise UserError(f"{fmu.file}: the unit of {variable.name}, {unit}, has factor {factor:g}, offset {offset:g}")
+    return Wire(port.name, variable, 1 / factor, -offset / factor)
 
 
 def declared_unit(variable: ModelVariable) -> str | None:
