@@ -78,8 +78,6 @@ def test_the_robot_finds_free_places_away_from_the_lights(name):
         (HEAD + LIGHT + "[[discs]]\ncentre = [5.05, 5]\nradius = 0.2\n", ["lights[0].position", "inside discs[0]"]),
         (HEAD + LIGHT + "[[walls]]\nstart = [0, 5]\nend = [10, 5]\nthickness = 0.5\n", ["inside walls[0]"]),
         (HEAD + LIGHT + "[[polygons]]\ncorners = [[4,4],[6,4],[5,7]]\n", ["inside polygons[0]"]),
-        (HEAD + LIGHT + "brightness = 0.9\n", ["lights[0].brightness", "more than 0.945", "0.95"]),
-        (HEAD + DIM.format(1) + DIM.format(9), ["lights[0].brightness", "can ever read"]),
         (HEAD + LIGHT + "[placement]\nlight_distance = 8\n", ["placement.light_distance", "lights[0]", "at most 7.07"]),
         (HEAD + LIGHT + "[placement]\nclearance = 4.9\n", ["placement.clearance", "fits nowhere"]),
         (HEAD + LIGHT + "[robot]\nlength = 11.0\nwidth = 11.0\n", ["robot.length", "fits nowhere"]),
@@ -112,9 +110,20 @@ def test_a_message_with_no_world_in_it_is_refused_at_every_door(paper):
         msgspec.structs.replace(paper, discs=[Disc((5.0, 5.0), 1.0)])
 
 
-def test_two_dim_lights_make_a_bright_place(paper):
-    together = arenas.parse(HEAD + DIM.format(5) + DIM.format(5.5), "t.toml")
-    assert len(together.lights) == 2
+def test_two_dim_lights_make_a_bright_place(enter):
+    enter(HEAD + DIM.format(5) + DIM.format(5.5))
+    with pytest.raises(UserError, match=r"t.toml: lights\[0\].brightness: no sensor can ever read"):
+        enter(HEAD + DIM.format(1) + DIM.format(9))
+    with pytest.raises(UserError, match=r"more than 0.945, .* above 0.95"):
+        enter(HEAD + LIGHT + "brightness = 0.9\n")
+
+
+def test_where_episodes_end_by_themselves_a_dim_light_is_a_warning(enter, monkeypatch, capsys):
+    monkeypatch.setattr("phototaxis.errors._said", set())
+    with pytest.raises(UserError):
+        enter(HEAD + LIGHT + "brightness = 0.1\n")
+    assert arenas.enter("t.toml", goal=False).lights[0].brightness == 0.1
+    assert "lights[0].brightness: no sensor can ever read" in capsys.readouterr().err
 
 
 @pytest.fixture

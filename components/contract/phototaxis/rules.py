@@ -11,10 +11,9 @@ from itertools import chain, pairwise
 import numpy as np
 
 from phototaxis.arena import Arena, Point, Polygon
-from phototaxis.sight import SHORT, falloff
+from phototaxis.sight import SHORT
 from phototaxis.solids import distance, extent, solids, thickness
 from phototaxis.strides import deepest, fastest, strides, thinnest
-from phototaxis.task import REACHED
 
 THINNEST = 0.002
 """What an obstacle must measure, m: twice the depth at which the solver leaves a contact."""
@@ -22,13 +21,11 @@ SMALLEST = 0.01
 """What the robot must measure, m."""
 MOST_STRIDES = 10_000
 """Steps of the solver in one control period."""
-_CELLS = 4096
-"""Cells of the search for a bright place, at a time."""
 
 
 def problem(arena: Arena) -> str:
     """The first rule that an arena breaks, in one line: `KEY: expected …`; "" when it breaks none."""
-    rules = _name, _obstacles, _robot, _motion, _sensors, _lights, _brightness
+    rules = _name, _obstacles, _robot, _motion, _sensors, _lights
     return next(chain.from_iterable(rule(arena) for rule in rules), "")
 
 
@@ -130,36 +127,3 @@ def _lights(arena: Arena) -> Iterator[str]:
                 yield f"{key}: {list(light.position)} is inside {where}, where no sensor can see it"
         if (most := math.hypot(max(x, width - x), max(y, height - y))) < away:
             yield f"placement.light_distance: no place in the room is {away} m from lights[{index}]; at most {most:.3g}"
-
-
-def _brightness(arena: Arena) -> Iterator[str]:
-    noise = arena.sensing.noise
-    brightest = (1 + noise) * _brightest(arena, REACHED / (1 + noise))
-    if brightest <= REACHED:
-        index = max(range(len(arena.lights)), key=lambda index: arena.lights[index].brightness)
-        yield (
-            f"lights[{index}].brightness: no sensor can ever read more than {brightest:.3g}, "
-            f"and the light counts as reached above {REACHED}"
-        )
-
-
-def _brightest(arena: Arena, enough: float) -> float:
-    """An upper bound of the sum of all lights anywhere, as tight as it needs to be compared with `enough`.
-
-    Cells that are too dark even if each light stood at its nearest point are dropped, the others quartered.
-    """
-    places = np.array([light.position for light in arena.lights])
-    brightness = np.array([light.brightness for light in arena.lights])
-    low, high = places.min(axis=0), places.max(axis=0)
-    middle, half = ((low + high) / 2)[None], (high - low) / 2
-    while True:
-        off = np.abs(middle[:, None] - places)
-        nearest, centre = np.maximum(off - half, 0.0), np.hypot(off[:, :, 0], off[:, :, 1])
-        bound = falloff(arena.sensing, np.hypot(nearest[:, :, 0], nearest[:, :, 1])) @ brightness
-        here = falloff(arena.sensing, centre) @ brightness
-        hopeful = bound > enough
-        if not hopeful.any() or (here > enough).any() or 4 * hopeful.sum() > _CELLS or half.max() < 1e-3:
-            return float(bound.max())
-        half = half / 2
-        corners = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)]) * half
-        middle = (middle[hopeful][:, None] + corners).reshape(-1, 2)

@@ -71,7 +71,9 @@ class LightSeeker(gymnasium.Env[Any, Any]):
             limit = f"gymnasium.make cuts episodes after {CAP} steps; give it max_episode_steps={cap}, too"
             logger.warn(f"cap {cap}: {limit}")
         try:
-            self._place: Place = There(connect, world, timeout) if connect else Here(arenas.enter(arena or "paper"))
+            self._place: Place = (
+                There(connect, world, timeout) if connect else Here(arenas.enter(arena or "paper", goal=False))
+            )
         except UserError as error:
             raise Error(str(error)) from None
         self._arena = self._place.arena

@@ -86,7 +86,9 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         self._mode, self.render_mode = AutoresetMode(autoreset_mode), render_mode
         try:
             self._place: Places = (
-                ManyThere(connect, world, timeout, num_envs) if connect else ManyHere(arenas.enter(arena or "paper"))
+                ManyThere(connect, world, timeout, num_envs)
+                if connect
+                else ManyHere(arenas.enter(arena or "paper", goal=False))
             )
         except UserError as error:
             raise Error(str(error)) from None

@@ -10,6 +10,7 @@ from phototaxis.arena import Arena
 from phototaxis.errors import UserError, warn
 from phototaxis.words import known, plain
 
+from phototaxis_sim.dim import too_dim
 from phototaxis_sim.survey import survey
 
 _FOLDER = resources.files("phototaxis_sim") / "arenas"
@@ -46,19 +47,26 @@ def load(name: str) -> Arena:
         raise UserError(f"arena {name!r}: {getattr(error, 'strerror', None) or error}") from None
 
 
-def enter(name: str) -> Arena:
+def enter(name: str, goal: bool = True) -> Arena:
     """As `load`, for a command that is about to use the arena: what is suspicious about it is a warning on stderr.
+
+    Without `goal`, as where episodes end by themselves, no light needs to be bright enough to be reached.
 
     Raises
     ------
     UserError
-        as in `load`, and when the robot can be placed nowhere, or only where the light is reached already.
+        as in `load`, and when the robot can be placed nowhere, or hardly anywhere but where the light is reached
+        already, or when no light can ever be reached.
     """
     arena = load(name)
     if name in shipped():  # there is nothing suspicious about them: a test says so
         return arena
     if arena.name in shipped() and arena.digest != load(arena.name).digest:
         warn(f"{name}: name: '{arena.name}' is the name of a shipped arena, and this is another world")
+    if dim := too_dim(arena):
+        if goal:
+            raise UserError(f"{name}: {dim}")
+        warn(f"{name}: {dim}")
     try:
         if arena.digest not in _surveyed:
             _surveyed[arena.digest] = survey(arena)
