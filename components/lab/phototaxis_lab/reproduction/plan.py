@@ -91,7 +91,6 @@ FRESH: Plan = {
         ("mirror", "simple", 1000),
         ("mirror", "rich", 10_000),
         ("dqn", "simple", 3000),
-        ("dqn", "rich", 5000),
         ("dqn", "continuous", 1000),
     )
 }
