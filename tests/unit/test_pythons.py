@@ -40,7 +40,7 @@ def test_the_promise_is_the_same_everywhere():
     first, last = PROMISED[0], PROMISED[-1]
     assert PROJECT["tool"]["pyright"]["pythonVersion"] == first
     assert PROJECT["tool"]["ruff"]["target-version"] == f"py{first.replace('.', '')}"
-    for page in ("constraints.txt", "scripts/setup"):
+    for page in ("constraints.txt", "scripts/setup", "README.md"):
         assert f"{first} to {last}" in (ROOT / page).read_text(), page
 
 
