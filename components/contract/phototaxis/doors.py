@@ -24,13 +24,13 @@ HARMLESS = frozenset(
 
 
 class Door(NamedTuple):
-    """A way in for somebody who is not on this machine."""
+    """An opening of a Zenoh session to other machines, such as a listener or multicast scouting."""
 
     what: str
     instead: str
     """What to do in place of it."""
     guarded: bool
-    """Whether who comes in has to say who it is, and may do only what it is allowed to."""
+    """Whether clients must authenticate, and the access control limits what each of them may do."""
 
 
 def get(config: zenoh.Config, key: str) -> Any:

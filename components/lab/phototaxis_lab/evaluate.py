@@ -90,7 +90,7 @@ def where(path: Path, meta: Checkpoint, given: str) -> Arena:
     Raises
     ------
     UserError
-        when the arena of the training is not to be had.
+        when the arena of the training is not shipped and no file is given.
     """
     from phototaxis_sim import arenas
 
