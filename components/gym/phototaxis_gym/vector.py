@@ -212,7 +212,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         return np.asarray(self._observe(self._readings, self._memory), self.single_observation_space.dtype)
 
     def _info(self, mask: np.ndarray) -> dict[str, Any]:
-        """The `info` of those robots as SyncVectorEnv has it: an array for each key, and a mask of the robots with a value."""
+        """The `info` of those robots as SyncVectorEnv has it: an array for each key, with a mask."""
         poses, count = self._place.poses, self.num_envs
         columns = {} if poses is None else {"pose": poses.copy()}
         columns["tick"] = np.full(count, self._place.tick)
