@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
-from phototaxis.bus import Bus, Event
+from phototaxis.bus import Bus
 from phototaxis.checkpoint import decode, encode, load, save
 from phototaxis.chunks import Chunks
 from phototaxis.codec import Refused
 from phototaxis.disk import unwritten
 from phototaxis.errors import Unavailable, UserError, warn
 from phototaxis.journal import GIVEN_UP, Journal
+from phototaxis.machine import Event
 from phototaxis.messages import (
     AgentLog,
     CheckpointReply,
@@ -353,9 +354,9 @@ class Server:
             warn(f"{self._bus.ident}: {fault}; if it dies now, what it learned since its last checkpoint is lost")
 
     def _record(self, agent: Agent) -> None:
-        self._log.add((agent, agent.tick[1], *agent.last), time.monotonic())
+        self._log.add((), (agent, agent.tick[1], *agent.last), time.monotonic())
 
-    def _chunk(self, seq: int, columns: list[Any]) -> AgentLog:
+    def _chunk(self, seq: int, _: tuple[Any, ...], columns: list[Any]) -> AgentLog:
         agents, tick, state, action, reward, error, temperature = columns
         agent: Agent = agents[0]
         log = AgentLog(

@@ -80,6 +80,20 @@ TOPICS = {
 }
 
 
+class StepTopics(NamedTuple):
+    """The three topics of the step protocol."""
+
+    state: str
+    readings: str
+    command: str
+
+
+def step_topics(robots: int) -> StepTopics:
+    """Where the step protocol of a world with so many robots is spoken."""
+    prefix = "crowd/" if robots > 1 else ""
+    return StepTopics(*(f"{prefix}{name}" for name in StepTopics._fields))
+
+
 class Role(NamedTuple):
     """What one kind of component listens to, and whom it dials where no router is used."""
 

@@ -8,11 +8,12 @@ from typing import Any, Literal
 
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError, Error, ResetNeeded
-from phototaxis.bus import Bus, Event
+from phototaxis.bus import Bus
 from phototaxis.codec import Refused
 from phototaxis.columns import FLAG, pack, unpack
 from phototaxis.component import made_up
 from phototaxis.errors import UserError
+from phototaxis.machine import Event
 from phototaxis.messages import Command, CommandOfMany, Control, End, Readings, ReadingsOfMany, World
 from phototaxis.options import convert
 from phototaxis.session import BusOptions, open_session, place

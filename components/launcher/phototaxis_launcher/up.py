@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta
-from phototaxis.bus import Bus, Event
+from phototaxis.bus import Bus
 from phototaxis.checkpoint import load
 from phototaxis.errors import INTERRUPTED, ComponentFailed, Unavailable, UserError, warn
 from phototaxis.fmu import FmuOptions
+from phototaxis.machine import Event
 from phototaxis.messages import MOST, Control, Count, Launch, LaunchReply, Seed, Status
 from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.ports import find_ports

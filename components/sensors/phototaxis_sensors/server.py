@@ -72,7 +72,7 @@ class Server:
             if models != self._models:  # a chunk has one set of models
                 self._log.flush()
                 self._models = models
-            self._log.add((state.run, state.tick, readings.sonar, readings.light), time.monotonic())
+            self._log.add((), (state.run, state.tick, readings.sonar, readings.light), time.monotonic())
 
     def _answer_many(self, state: StateOfMany) -> None:
         if self._many is None or self._many[0].run != state.run:
@@ -95,7 +95,7 @@ class Server:
             self._newest = state.tick
             robots = self._many[0].robots
             sonar, light = unpack(readings.sonar, robots, 16), unpack(readings.light, robots, 2)
-            self._log.add((state.run, state.tick, sonar[:, 0].tolist(), light[:, 0].tolist()), time.monotonic())
+            self._log.add((), (state.run, state.tick, sonar[:, 0].tolist(), light[:, 0].tolist()), time.monotonic())
         return None
 
     def _meet(self, state: State) -> Session | None:
@@ -136,7 +136,7 @@ class Server:
             for model in suite.models:
                 model.begun_anew(began)
 
-    def _chunk(self, seq: int, columns: list[Any]) -> SensorsLog:
+    def _chunk(self, seq: int, _: tuple[Any, ...], columns: list[Any]) -> SensorsLog:
         runs, ticks, sonars, lights = columns
         sonar, light = list(chain.from_iterable(sonars)), list(chain.from_iterable(lights))
         return SensorsLog(runs[0], seq, self._bus.ident, self._models[0], self._models[1], ticks, sonar, light)
