@@ -10,13 +10,13 @@ from phototaxis.errors import Unavailable, UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Control, Status, World
 from phototaxis.ports import find_ports, free_ports
-from phototaxis.recordings import Recording, Summary
 from phototaxis_agent.setup import make_setup
 from phototaxis_launcher import demo, swap, up
 from phototaxis_launcher.cli import extra_with
 from phototaxis_launcher.places import places
 from phototaxis_launcher.progress import success
-from phototaxis_launcher.recordings import table
+from phototaxis_recorder.recordings import table
+from phototaxis_recorder.summary import RecordingFile, Summary
 from phototaxis_sim import arenas
 
 
@@ -109,7 +109,7 @@ def test_success_is_told_of_episodes_that_have_ended():
 )
 def test_a_recording_tells_success_of_episodes_that_have_ended(episodes, words):
     summary = Summary("r", "paper", episodes=episodes, reached=min(3, episodes), recent=0.4)
-    assert words in table([Recording(Path("r.rrd"), 1, 0.0, summary)])[1]
+    assert words in table([RecordingFile(Path("r.rrd"), 1, 0.0, summary)])[1]
 
 
 def test_the_end_says_how_to_look_again(tmp_path, monkeypatch):
@@ -138,7 +138,7 @@ def test_a_busy_port_says_who_holds_it(monkeypatch):
 
 def test_a_missing_package_names_its_extra():
     assert extra_with("torch", "agent") == "agent"
-    assert extra_with("fmpy", "sensors,fmu") == "sensors,fmu"
+    assert extra_with("fmpy", "fmu") == "fmu"
     assert extra_with("no_such_package", "lab") == "lab"
 
 

@@ -11,8 +11,10 @@ ROOT = Path(__file__).parents[2]
 COMPONENTS = {folder.name: folder for folder in (ROOT / "components").iterdir() if folder.is_dir()}
 ALLOWED = {
     "contract": set(),
-    "sim": set(),
-    "sensors": set(),
+    "world": set(),
+    "sim": {"world"},  # a library, no process
+    "sensors": {"world"},
+    "fmu": {"sensors"},  # it provides models for the sensors, as a learner does for the agent
     "agent": set(),
     "recorder": set(),
     "launcher": set(),

@@ -18,9 +18,8 @@ from phototaxis.errors import INTERRUPTED, ComponentFailed, Unavailable, UserErr
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import MOST, Control, Count, Launch, LaunchReply, Seed, Status
 from phototaxis.options import Parser, add_options, convert, flags, peek
-from phototaxis.ports import find_ports
+from phototaxis.ports import find_ports, viewer_url
 from phototaxis.session import BusOptions, open_session
-from phototaxis.viewer import viewer_url
 
 from phototaxis_launcher.folder import RunFolder
 from phototaxis_launcher.places import places, program

@@ -11,7 +11,8 @@ from typing import cast
 
 from phototaxis.errors import ComponentFailed
 from phototaxis.ports import free_ports
-from phototaxis.viewer import rerun_program
+
+from phototaxis_recorder.viewer import rerun_program
 
 FILES = ("/", "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/apple-touch-icon.png")
 """Everything that the web viewer is made of."""

@@ -12,9 +12,10 @@ from typing import Any
 from phototaxis.disk import write_whole
 from phototaxis.errors import ComponentFailed
 from phototaxis.ports import free_ports
-from phototaxis.viewer import rerun_program
 from PIL import Image
 from rerun.experimental import ViewerClient
+
+from phototaxis_recorder.viewer import rerun_program
 
 STARTING = 20.0
 SIZE = "1500x900"

@@ -11,7 +11,8 @@ import msgspec
 from msgspec import Meta
 from phototaxis.errors import UserError
 from phototaxis.options import parse
-from phototaxis.recordings import Recording, recordings, summary_file
+
+from phototaxis_recorder.summary import RecordingFile, recordings, summary_file
 
 DAY, MEGABYTE = 86_400, 1_000_000
 BUSY = 60.0
@@ -60,7 +61,9 @@ def main(argv: Sequence[str]) -> int:
     return 0
 
 
-def excess(found: list[Recording], now: float, max_age: float | None, max_size: float | None) -> list[Recording]:
+def excess(
+    found: list[RecordingFile], now: float, max_age: float | None, max_size: float | None
+) -> list[RecordingFile]:
     """Those of the recordings (newest first) that exceed an age in days or a total size in MB; none in use."""
     doomed, total = [], 0
     for recording in found:
@@ -72,13 +75,13 @@ def excess(found: list[Recording], now: float, max_age: float | None, max_size: 
     return doomed
 
 
-def as_object(recording: Recording) -> dict[str, object]:
+def as_object(recording: RecordingFile) -> dict[str, object]:
     """A recording for --json."""
     summary = msgspec.to_builtins(recording.summary) if recording.summary else {}
     return {"file": str(recording.file), "bytes": recording.size, "written": recording.written, **summary}
 
 
-def table(found: list[Recording]) -> list[str]:
+def table(found: list[RecordingFile]) -> list[str]:
     """The recordings as aligned lines."""
     rows: list[tuple[str, ...]] = [("recording", "run", "arena", "drivers", "epochs", "success", "MB")]
     worlds = {(one.summary.arena, one.summary.arena_digest) for one in found if one.summary is not None}
