@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from phototaxis import __version__
 from phototaxis.errors import UserError, leave, one_line
+from phototaxis.roles import COMPONENTS
 from phototaxis.words import known
 
 
@@ -35,10 +36,7 @@ VERBS = {
     "check": Verb(
         "phototaxis_lab.check:main", "lab", "an agent against the contract; rights and wire format against the code"
     ),
-    "sim": Verb("phototaxis_sim.__main__:main", "sim", "the simulation alone"),
-    "sensors": Verb("phototaxis_sensors.__main__:main", "sensors", "the sensors alone"),
-    "agent": Verb("phototaxis_agent.__main__:main", "agent", "an agent alone"),
-    "recorder": Verb("phototaxis_recorder.__main__:main", "recorder", "the recorder alone"),
+    **{name: Verb(f"phototaxis_{name}.__main__:main", name, role.about) for name, role in COMPONENTS.items()},
     "fmu": Verb("phototaxis_fmu.cli:main", "fmu", "look into, check or build FMUs (sensor models)"),
     "view": Verb("phototaxis_recorder.view:main", "recorder", "the live view or a recording, in a window or browser"),
     "recordings": Verb("phototaxis_recorder.recordings:main", "recorder", "list recordings; remove old ones"),
