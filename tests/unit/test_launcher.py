@@ -11,8 +11,9 @@ from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Control, Status, World
 from phototaxis.ports import find_ports, free_ports
 from phototaxis_agent.setup import make_setup
-from phototaxis_launcher import demo, swap, up
+from phototaxis_launcher import demo, swap
 from phototaxis_launcher.cli import extra_with
+from phototaxis_launcher.options import UpOptions, parse
 from phototaxis_launcher.places import places
 from phototaxis_launcher.progress import success
 from phototaxis_recorder.recordings import table
@@ -36,7 +37,7 @@ class Said(list[str]):
 
 
 def test_a_watched_demo_begins_and_ends_slowly():
-    story = demo.Story(up.UpOptions(epochs=3000), FmuOptions(), stays=True, paced=True)
+    story = demo.Story(UpOptions(epochs=3000), FmuOptions(), stays=True, paced=True)
     wire, said = Wire(), Said()
 
     def at(epoch: int, phase: str = "paused", driver: str = "qtable-1", waiting_for: str = "") -> list[str]:
@@ -66,7 +67,7 @@ def test_a_watched_demo_begins_and_ends_slowly():
 
 
 def test_a_demo_that_nobody_watches_is_left_alone():
-    story = demo.Story(up.UpOptions(epochs=3000), FmuOptions(), stays=False, paced=False)
+    story = demo.Story(UpOptions(epochs=3000), FmuOptions(), stays=False, paced=False)
     wire, said = Wire(), Said()
     for epoch in range(0, 3001, 100):
         story.follow(Status("r", "running", epoch=epoch, epochs=3000, driver="q"), wire, said)  # pyright: ignore
@@ -91,7 +92,7 @@ def test_a_demo_that_nobody_watches_is_left_alone():
 def test_the_papers_number_is_told_of_the_papers_system_alone(learner, given, options, fmus, is_it):
     arena = arenas.load(options.get("arena", "paper"))
     meta = make_setup(learner, **given).agent(World(run="r", arena=arena, seed=0, epochs=3000)).checkpoint()[0]
-    assert demo.is_the_papers(meta, up.UpOptions(**options), FmuOptions(**fmus)) is is_it
+    assert demo.is_the_papers(meta, UpOptions(**options), FmuOptions(**fmus)) is is_it
 
 
 def test_success_is_told_of_episodes_that_have_ended():
@@ -145,7 +146,7 @@ def test_a_missing_package_names_its_extra():
 @pytest.mark.parametrize("words", [["--checkpoint=c.npz"], ["--policy", "p.zip"], ["--take-over"], ["--worlds", "a,b"]])
 def test_the_launchers_own_agents_are_not_those_that_are_started_alone(words):
     with pytest.raises(UserError, match=f"{words[0].split('=')[0]} is for an agent that is started alone"):
-        up.parse(words)
+        parse(words)
 
 
 def test_a_swap_says_what_delays_it():

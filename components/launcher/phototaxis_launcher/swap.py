@@ -12,7 +12,7 @@ from phototaxis.messages import Control, Launch, LaunchReply, Status
 from phototaxis.options import Parser, add_options, convert
 from phototaxis.session import BusOptions, open_session
 
-from phototaxis_launcher.up import for_ours
+from phototaxis_launcher.options import for_ours
 
 LINKED_WITHIN = 2.0
 
