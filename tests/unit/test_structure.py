@@ -1,11 +1,15 @@
 """The house rules that a reader relies on."""
 
 import ast
+import sys
 import tomllib
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from phototaxis.roles import COMPONENTS, ROLES
 from phototaxis.topics import TOPICS, table
 from phototaxis_launcher.cli import VERBS
@@ -22,26 +26,54 @@ ALLOWED = {
     "fmu": {"sensors"},  # it provides models for the sensors, as a learner does for the agent
     "agent": set(),
     "recorder": set(),
-    "launcher": set(),
+    "launcher": {"agent"},  # it checks an agent's options before it starts anything
     "gym": {"sim", "sensors"},  # a world in one process
     "lab": {"sim", "sensors", "agent"},  # its purpose is to put them into one process
 }
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+BESIDE = {
+    "contract": {"psutil"},  # who holds a port is told where it is there
+    "fmu": {"lxml"},  # fmpy brings it
+    "gym": {"stable-baselines3"},  # whoever has a policy of it has it
+    "lab": {"distributed"},  # the extra cluster
+    "launcher": {"trustme"},  # the extra certs
+}
+"""What is imported only where it is there, or where an extra of its own was asked for."""
+
+
+def imported(room: str) -> set[str]:
+    """The packages that a room imports at any place, also by their names in quotes."""
+    found = []
+    for node in (node for file in ROOMS[room].rglob("*.py") for node in ast.walk(ast.parse(file.read_text()))):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.append(node.module)
+        elif isinstance(node, ast.Call) and getattr(node.func, "id", "") == "import_module":
+            found += [word.value for word in node.args if isinstance(word, ast.Constant)]
+    return {module.split(".")[0] for module in found}
 
 
 @pytest.mark.parametrize("name", ROOMS)
 def test_no_component_imports_another(name):
-    for file in ROOMS[name].rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text())):
-            modules = []
-            if isinstance(node, ast.Import):
-                modules = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                modules = [node.module]
-            for module in modules:
-                top = module.split(".")[0]
-                if top.startswith("phototaxis_"):
-                    other = top.removeprefix("phototaxis_")
-                    assert other == name or other in ALLOWED[name], f"{file} imports {module}"
+    others = {package.removeprefix("phototaxis_") for package in imported(name) if package.startswith("phototaxis_")}
+    assert others <= {name, *ALLOWED[name]}
+
+
+@pytest.mark.parametrize("name", ROOMS)
+def test_a_room_imports_only_what_the_base_and_its_own_extra_bring(name):
+    brought = required(PROJECT["project"]["dependencies"]) | required(EXTRAS.get(name, [])) | BESIDE.get(name, set())
+    distributions = packages_distributions()
+    for package in imported(name) - sys.stdlib_module_names:
+        if not package.startswith("phototaxis"):
+            assert brought & {canonicalize_name(one) for one in distributions[package]}, package
+
+
+def required(lines: list[str]) -> set[str]:
+    """The distributions that lines of pyproject.toml name, also through our own extras."""
+    found = [Requirement(line) for line in lines]
+    ours = [required(EXTRAS[extra]) for one in found if one.name == "phototaxis" for extra in one.extras]
+    return {canonicalize_name(one.name) for one in found}.union(*ours)
 
 
 @pytest.mark.parametrize("name", ROOMS)
@@ -50,7 +82,7 @@ def test_a_room_has_one_name(name):
     assert [path.name for path in ROOMS[name].iterdir()] == [package], "its folder holds its package alone"
     assert f"components/{name}/{package}" in PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
     assert f"components/{name}" in PROJECT["tool"]["pyright"]["extraPaths"]
-    assert name == "contract" or name in PROJECT["project"]["optional-dependencies"]
+    assert name == "contract" or name in EXTRAS
 
 
 def test_what_is_listed_of_rooms_exists():
@@ -62,7 +94,7 @@ def test_what_is_listed_of_rooms_exists():
 def test_a_subcommand_of_a_rooms_name_is_in_that_room():
     for verb, found in VERBS.items():
         assert verb not in ROOMS or (found.target.startswith(f"phototaxis_{verb}.") and found.extra == verb)
-        assert found.extra in PROJECT["project"]["optional-dependencies"]
+        assert found.extra in EXTRAS
 
 
 @pytest.mark.parametrize("name", COMPONENTS)

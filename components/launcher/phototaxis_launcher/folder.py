@@ -1,4 +1,4 @@
-"""The folder of a run: where each of its files is."""
+"""The folder of a run."""
 
 import shutil
 from collections.abc import Iterator
@@ -35,22 +35,12 @@ class RunFolder:
         return self.path.name
 
     @property
-    def journal(self) -> Path:
-        """The simulation's."""
-        return self.path / "sim.journal"
-
-    @property
-    def recording(self) -> Path:
-        """The one that the recorder begins with; it numbers the next ones."""
-        return self.path / "recording.rrd"
-
-    @property
     def recordings(self) -> list[Path]:
         """All recordings that there are, the newest last."""
         return sorted(self.path.glob("recording*.rrd"), key=lambda file: file.stat().st_mtime)
 
     def checkpoint(self, agent: str) -> Path:
-        """That of an agent, by its name here."""
+        """That of the agent with this name among the launcher's processes."""
         return self.path / f"{agent.replace('agent', 'checkpoint')}.npz"
 
     @contextmanager

@@ -1,7 +1,5 @@
 """The processes of a run: one for each component of the table of roles, and any number of agents."""
 
-from pathlib import Path
-
 from phototaxis.errors import Unavailable, UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Status
@@ -35,13 +33,13 @@ class Processes:
             "sim": [
                 f"--run={folder.run}", f"--arena={options.arena}", f"--seed={options.seed}",
                 f"--epochs={options.epochs}", f"--speed={options.speed}", f"--robots={options.robots}",
-                f"--journal={folder.journal}",
+                f"--journal={folder.path / 'sim.journal'}",
             ],
             "sensors": flags(fmus),
         }  # fmt: skip
         if ports:
-            grpc, web = ports
-            arguments["recorder"] = [f"--output={folder.recording}", f"--grpc-port={grpc}", f"--web-port={web}"]
+            output, (grpc, web) = folder.path / "recording.rrd", ports
+            arguments["recorder"] = [f"--output={output}", f"--grpc-port={grpc}", f"--web-port={web}"]
         self.children = {role: self._child(role, role, own) for role, own in arguments.items()}
         self.children["agent"] = self._agent(words)
         for tick, learner in swap_plan(options.swap):
@@ -99,7 +97,3 @@ class Processes:
     def faults(self) -> list[UserError]:
         """What ended before its time, or could not be saved to its end."""
         return [*self._lost, *(Unavailable(fault) for child in self.all() if (fault := child.fault()))]
-
-    def checkpoint(self, agent: Child) -> Path:
-        """That of one of the agents."""
-        return self._folder.checkpoint(agent.name)

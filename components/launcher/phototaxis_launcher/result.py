@@ -19,8 +19,8 @@ def result(status: Status, options: UpOptions, folder: RunFolder, processes: Pro
     """What the run came to; the learner is the one that drove last, if that is one of ours."""
     agents = {ident: agent for agent in processes.agents for ident in agent.idents}
     last = agents.get(status.drivers[-1].driver) if status.drivers else None
-    unsaved = last is None or last.fault() or not processes.checkpoint(last).exists()
-    checkpoint = None if last is None or unsaved else processes.checkpoint(last)
+    unsaved = last is None or last.fault() or not folder.checkpoint(last.name).exists()
+    checkpoint = None if last is None or unsaved else folder.checkpoint(last.name)
     meta = load(checkpoint)[0] if checkpoint else None
     recordings = folder.recordings
     return {
@@ -32,7 +32,7 @@ def result(status: Status, options: UpOptions, folder: RunFolder, processes: Pro
             {
                 "driver": one.driver,
                 "learner": agents[one.driver].label if one.driver in agents else None,
-                "checkpoint": str(processes.checkpoint(agents[one.driver])) if one.driver in agents else None,
+                "checkpoint": str(folder.checkpoint(agents[one.driver].name)) if one.driver in agents else None,
                 "from_tick": one.tick,
                 "how": one.how,
             }

@@ -1,7 +1,7 @@
 """Which sensor models a suite is made of: the built-in ones, or those that an installed package provides."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from importlib.metadata import entry_points
 from typing import Protocol
 
@@ -68,12 +68,9 @@ def choose(options: FmuOptions, one_cpu: bool = False) -> Iterator[Choice]:
     if options == FmuOptions():
         yield BuiltInChoice()
         return
-    models = provider("fmu")(options, one_cpu)
-    models.try_out()
-    try:
+    with closing(provider("fmu")(options, one_cpu)) as models:
+        models.try_out()
         yield models
-    finally:
-        models.close()
 
 
 def provider(name: str) -> Callable[[FmuOptions, bool], Provided]:
