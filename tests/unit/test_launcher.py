@@ -12,9 +12,13 @@ from phototaxis.messages import Control, Status, World
 from phototaxis.ports import find_ports, free_ports
 from phototaxis_agent.setup import make_setup
 from phototaxis_launcher import demo, swap
+from phototaxis_launcher.child import Child
 from phototaxis_launcher.cli import extra_with
+from phototaxis_launcher.folder import RunFolder
+from phototaxis_launcher.news import News
 from phototaxis_launcher.options import UpOptions, parse
 from phototaxis_launcher.places import places
+from phototaxis_launcher.processes import Processes
 from phototaxis_launcher.progress import success
 from phototaxis_recorder.recordings import table
 from phototaxis_recorder.summary import RecordingFile, Summary
@@ -34,6 +38,9 @@ class Wire:
 class Said(list[str]):
     def say(self, text: str) -> None:
         self.append(text)
+
+    def show(self, status: Status) -> None:
+        """A bar is no news."""
 
 
 def test_a_watched_demo_begins_and_ends_slowly():
@@ -154,3 +161,47 @@ def test_a_swap_says_what_delays_it():
     assert "phototaxis control resume" in swap.what_delays(Status("r", "paused"))
     with pytest.raises(Unavailable, match="the run r is finished"):
         swap.what_delays(Status("r", "finished"))
+
+
+@pytest.fixture
+def processes(tmp_path: Path) -> Processes:
+    options = UpOptions(out=str(tmp_path), swap="100:mirror")
+    return Processes(options, FmuOptions(), ["--percept=rich"], RunFolder(tmp_path), [1, 2])
+
+
+def test_processes_start_and_end_as_the_table_of_roles_says(processes: Processes, monkeypatch: pytest.MonkeyPatch):
+    told = []
+    monkeypatch.setattr(Child, "start", lambda child: told.append(child.name))
+    monkeypatch.setattr(Child, "stop", lambda child, patience: told.append((child.name, patience)))
+    processes.start()
+    assert told == ["sim", "sensors", "recorder", "agent-2"], "the first agent joins when these are on the bus"
+    told.clear()
+    processes.another_agent(["--learner=qtable"])
+    processes.stop()
+    ends = [("recorder", 60), ("agent", 15), ("agent-2", 15), ("agent-3", 15), ("sensors", 5), ("sim", 5)]
+    assert told == ["agent-3", *ends]
+
+
+def test_the_first_agent_waits_for_all_others(processes: Processes):
+    first, second = processes.agents
+    second.idents.append("mirror-1")
+    there = ["sim/s", "sensors/s", "agent/mirror-1", "observer/o"]
+    assert processes.missing(Status(run="r", phase="waiting", alive=there, next=["mirror-1"])) == ["recorder"]
+    there.append("recorder/r")
+    assert processes.missing(Status(run="r", phase="waiting", alive=there)) == ["agent-2"]
+    assert processes.missing(Status(run="r", phase="waiting", alive=there, next=["mirror-1"])) == []
+    processes.go_on_without_recorder(Unavailable("recorder: the disk is full"))
+    assert processes.complete(Status(run="r", phase="running", alive=there[:3]))
+    assert [str(fault) for fault in processes.faults()] == ["recorder: the disk is full"]
+    assert first.idents == []
+
+
+def test_a_slow_or_silent_part_is_named_once(tmp_path: Path):
+    said = Said()
+    news = News(said, RunFolder(tmp_path), FmuOptions(light_fmu="lag.fmu"))  # pyright: ignore
+    silent = Status(run="r", phase="waiting", driver="q-1", waited=6.0, tick=3)
+    for status in (silent, silent, Status(run="r", phase="running", driver="q-1"), silent):
+        news.follow(status)
+    complaints = [line for line in said if "does not answer tick 3" in line]
+    assert len(complaints) == 2, "again, when it begins again"
+    assert complaints[0].endswith("(the sensors use lag.fmu)")

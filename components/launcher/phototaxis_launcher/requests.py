@@ -33,7 +33,7 @@ class SwapRequests:
 
     def fail(self, child: Child, why: str) -> bool:
         """Tell who asked for this agent why it does not drive, and forget it; False when nobody asked for it."""
-        if not self._answer(child, LaunchReply(why)):
+        if not self._answer(child, LaunchReply(reason=why)):
             return False
         self._progress.say(why)
         self._processes.agents.remove(child)

@@ -99,7 +99,7 @@ class Run:
 
     def _follow(self, bus: Bus) -> Status:
         """From the first status to the last."""
-        status, deadline = Status(self._folder.run, "waiting"), time.monotonic() + STARTING_S
+        status, deadline = Status(run=self._folder.run, phase="waiting"), time.monotonic() + STARTING_S
         while not self._complete(status) and not self._processes.children["sim"].left:
             event = bus.receive(timeout=self._show.wait())
             self._show.beat(bus)
@@ -156,13 +156,13 @@ class Run:
 
 def _paused(bus: Bus, status: Status) -> Status:
     """The status of a run that is paused for its end, when the driver has answered its last tick."""
-    reply, deadline = bus.control(Control("pause"), ANSWERED_WITHIN_S), time.monotonic() + ANSWERED_WITHIN_S
+    reply, deadline = bus.control(Control(verb="pause"), ANSWERED_WITHIN_S), time.monotonic() + ANSWERED_WITHIN_S
     while reply is not None:
         status = reply.status  # asked for: those in the inbox may be older than the pause
         if status.phase != "paused" or not status.waiting_for or time.monotonic() > deadline:
             break
         bus.receive(timeout=0.05)
-        reply = bus.control(Control("status"), ANSWERED_WITHIN_S)
+        reply = bus.control(Control(verb="status"), ANSWERED_WITHIN_S)
     return status
 
 
