@@ -174,7 +174,7 @@ def test_processes_start_and_end_as_the_table_of_roles_says(processes: Processes
     monkeypatch.setattr(Child, "start", lambda child: told.append(child.name))
     monkeypatch.setattr(Child, "stop", lambda child, patience: told.append((child.name, patience)))
     processes.start()
-    assert told == ["sim", "sensors", "recorder", "agent-2"], "the first agent joins when these are on the bus"
+    assert told == ["sim", "sensors", "agent-2", "recorder"], "the first agent joins when these are on the bus"
     told.clear()
     processes.another_agent(["--learner=qtable"])
     processes.stop()

@@ -67,11 +67,9 @@ class Processes:
 
     def start(self) -> None:
         """Start all but the first agent, which joins when the others are there."""
-        for role, child in self.children.items():
-            if not COMPONENTS[role].joins_last:
+        for name, role in COMPONENTS.items():
+            for child in self._of(name)[1 if role.joins_last else 0 :]:
                 child.start()
-        for agent in self.agents[1:]:
-            agent.start()
 
     def missing(self, status: Status) -> list[str]:
         """Whom the first agent still waits for: who is not on the bus, or has not asked for its turn."""
@@ -86,8 +84,11 @@ class Processes:
     def stop(self) -> None:
         """End every process, in the opposite order."""
         for name, role in reversed(COMPONENTS.items()):
-            for child in self.agents if name == "agent" else [self.children[name]] if name in self.children else []:
+            for child in self._of(name):
                 child.stop(role.ends_within_s)
+
+    def _of(self, role: str) -> list[Child]:
+        return self.agents if role == "agent" else [self.children[role]] if role in self.children else []
 
     def go_on_without_recorder(self, error: UserError) -> None:
         """Forget the recorder, which has ended before the run."""
