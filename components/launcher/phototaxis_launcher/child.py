@@ -13,7 +13,7 @@ from phototaxis.disk import try_file, unwritten
 from phototaxis.errors import ERROR, WARNING, ComponentFailed, Unavailable, UserError
 
 RESTARTS = 3
-WITHIN = 20.0
+WITHIN_S = 20.0
 """A component that dies more than RESTARTS times within this many seconds keeps dying."""
 MENDABLE = {2: UserError, 3: Unavailable, 4: ComponentFailed}
 """Exit codes by which a component says in a line why it ends; it is not restarted, it would end the same."""
@@ -103,7 +103,7 @@ class Child:
         if self.process is None:
             return
         self._deaths.append(time.monotonic())
-        if len(self._deaths) > RESTARTS and self._deaths[-1] - self._deaths[0] < WITHIN:
+        if len(self._deaths) > RESTARTS and self._deaths[-1] - self._deaths[0] < WITHIN_S:
             who = f"{self.name} (learner {self.label})" if self.label else self.name
             words = self.last_words()
             raise ComponentFailed(

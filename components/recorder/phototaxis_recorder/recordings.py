@@ -14,8 +14,8 @@ from phototaxis.options import parse
 
 from phototaxis_recorder.summary import RecordingFile, recordings, summary_file
 
-DAY, MEGABYTE = 86_400, 1_000_000
-BUSY = 60.0
+DAY_S, MEGABYTE = 86_400, 1_000_000
+BUSY_S = 60.0
 """A recording written to within this many seconds is not removed."""
 
 
@@ -68,9 +68,9 @@ def excess(
     doomed, total = [], 0
     for recording in found:
         total += recording.size
-        old = max_age is not None and now - recording.written > max_age * DAY
+        old = max_age is not None and now - recording.written > max_age * DAY_S
         much = max_size is not None and total > max_size * MEGABYTE
-        if (old or much) and now - recording.written > BUSY:
+        if (old or much) and now - recording.written > BUSY_S:
             doomed.append(recording)
     return doomed
 

@@ -3,6 +3,9 @@
 import os
 from pathlib import Path
 
+STARTS_WITHIN_S = 20.0
+"""Seconds that it gets to start."""
+
 
 def rerun_program() -> Path:
     """Rerun's own program; the script of the same name would leave it an orphan."""
