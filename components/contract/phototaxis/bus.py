@@ -20,7 +20,8 @@ from zenoh.handlers import Callback
 from phototaxis.codec import Decoder, Refused, encode
 from phototaxis.machine import STOP, Answer, Ask, Event, Refusal
 from phototaxis.messages import ControlReply, LogRequest, Message
-from phototaxis.topics import ROLES, TOPICS, Topic, alive_key
+from phototaxis.roles import ROLES
+from phototaxis.topics import TOPICS, Topic, alive_key
 
 GRACE = 0.5
 """Seconds after a query's timeout in which Zenoh should have ended it."""

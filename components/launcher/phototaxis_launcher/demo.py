@@ -16,10 +16,11 @@ from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Control, Status
 from phototaxis.options import flags
 
-from phototaxis_launcher import up
+from phototaxis_launcher.options import UpOptions, parse
 from phototaxis_launcher.places import places, program
 from phototaxis_launcher.progress import Progress
 from phototaxis_launcher.show import Show
+from phototaxis_launcher.up import Run
 
 TICKS_A_SECOND = 10.0
 """What eyes can follow."""
@@ -35,11 +36,11 @@ PAPERS_EPOCHS = 3000
 
 
 def main(argv: Sequence[str]) -> int:
-    options, fmus, words = up.parse(argv, "phototaxis demo")
+    options, fmus, words = parse(argv, "phototaxis demo")
     watched = sys.stderr.isatty() and not (options.json or options.no_recorder)
     show = Story(options, fmus, stays=watched, paced=bool(watched and options.epochs and not options.speed))
-    run = up.Run(options, fmus, words)
-    status = run.go(Progress(options.epochs), show)
+    run = Run(options, fmus, words, show)
+    status = run.go()
     result = run.result(status)
     if options.json:
         print(json.dumps({**result, "evaluation": show.found}), flush=True)
@@ -62,7 +63,7 @@ class Story(Show):
     found : what the evaluation of the learned policy gave, or None.
     """
 
-    def __init__(self, options: up.UpOptions, fmus: FmuOptions, stays: bool, paced: bool):
+    def __init__(self, options: UpOptions, fmus: FmuOptions, stays: bool, paced: bool):
         self._options, self._fmus, self._stays = options, fmus, stays
         self._fast_from = min(FIRST, options.epochs)
         self._slow_from = max(options.epochs - LAST, self._fast_from)
@@ -149,7 +150,7 @@ class Story(Show):
         return [*lines, "", *(f"  {line}" for line in places(result)), ""]
 
 
-def is_the_papers(meta: Meta, options: up.UpOptions, fmus: FmuOptions) -> bool:
+def is_the_papers(meta: Meta, options: UpOptions, fmus: FmuOptions) -> bool:
     """Whether a run was of the system for which the paper reports its 80%."""
     system = (meta.learner, meta.percept, meta.arena, options.epochs, options.robots, options.swap)
     return (

@@ -14,9 +14,10 @@ from phototaxis.disk import try_file, try_folder
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse
-from phototaxis.page import ViewerPage
-from phototaxis.ports import find_ports
-from phototaxis.viewer import silence_rerun, viewer_url
+from phototaxis.ports import find_ports, viewer_url
+
+from phototaxis_recorder.page import ViewerPage
+from phototaxis_recorder.viewer import silence_rerun
 
 
 class Options(ComponentOptions, kw_only=True):

@@ -8,7 +8,8 @@ from phototaxis.bus import Bus
 from phototaxis.codec import Decoder, Refused
 from phototaxis.errors import Unavailable
 from phototaxis.messages import LogRequest, Recorded, World
-from phototaxis.topics import ROLES, TOPICS
+from phototaxis.roles import ROLES
+from phototaxis.topics import TOPICS
 
 from phototaxis_recorder.sinks import Recording
 

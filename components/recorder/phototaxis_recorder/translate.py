@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
-from phototaxis.recordings import Summary
 from phototaxis.task import ACTIONS, PERCEPTS
 
 from phototaxis_recorder import policy
 from phototaxis_recorder.colors import BLUE, of_distance, of_reward
 from phototaxis_recorder.layout import MEAN, PAPER, draw_world
+from phototaxis_recorder.summary import Summary
 
 PATIENCE = 4000
 """Rows of one role that may wait for another's."""

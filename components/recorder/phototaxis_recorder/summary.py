@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
-
 from phototaxis.disk import write_whole
 
 
@@ -28,7 +27,7 @@ class Summary(msgspec.Struct):
     """Share of the last 50 episodes that reached the light."""
 
 
-class Recording(NamedTuple):
+class RecordingFile(NamedTuple):
     """One recording on disk."""
 
     file: Path
@@ -50,7 +49,7 @@ def write_summary(file: Path, summary: Summary) -> None:
     write_whole(summary_file(file), msgspec.json.encode(summary))
 
 
-def recordings(folder: Path) -> list[Recording]:
+def recordings(folder: Path) -> list[RecordingFile]:
     """All recordings in a folder and the folders of runs in it, the newest first."""
     found = []
     for file in {*folder.glob("*.rrd"), *folder.glob("*/*.rrd")}:
@@ -59,5 +58,5 @@ def recordings(folder: Path) -> list[Recording]:
             summary = msgspec.json.decode(summary_file(file).read_bytes(), type=Summary)
         with suppress(FileNotFoundError):  # somebody removes it just now
             info = file.stat()
-            found.append(Recording(file, info.st_size, info.st_mtime, summary))
+            found.append(RecordingFile(file, info.st_size, info.st_mtime, summary))
     return sorted(found, key=lambda recording: recording.written, reverse=True)

@@ -11,10 +11,11 @@ import msgspec
 from msgspec import Meta
 from phototaxis.errors import UserError
 from phototaxis.options import parse
-from phototaxis.recordings import Recording, recordings, summary_file
 
-DAY, MEGABYTE = 86_400, 1_000_000
-BUSY = 60.0
+from phototaxis_recorder.summary import RecordingFile, recordings, summary_file
+
+DAY_S, MEGABYTE = 86_400, 1_000_000
+BUSY_S = 60.0
 """A recording written to within this many seconds is not removed."""
 
 
@@ -60,25 +61,27 @@ def main(argv: Sequence[str]) -> int:
     return 0
 
 
-def excess(found: list[Recording], now: float, max_age: float | None, max_size: float | None) -> list[Recording]:
+def excess(
+    found: list[RecordingFile], now: float, max_age: float | None, max_size: float | None
+) -> list[RecordingFile]:
     """Those of the recordings (newest first) that exceed an age in days or a total size in MB; none in use."""
     doomed, total = [], 0
     for recording in found:
         total += recording.size
-        old = max_age is not None and now - recording.written > max_age * DAY
+        old = max_age is not None and now - recording.written > max_age * DAY_S
         much = max_size is not None and total > max_size * MEGABYTE
-        if (old or much) and now - recording.written > BUSY:
+        if (old or much) and now - recording.written > BUSY_S:
             doomed.append(recording)
     return doomed
 
 
-def as_object(recording: Recording) -> dict[str, object]:
+def as_object(recording: RecordingFile) -> dict[str, object]:
     """A recording for --json."""
     summary = msgspec.to_builtins(recording.summary) if recording.summary else {}
     return {"file": str(recording.file), "bytes": recording.size, "written": recording.written, **summary}
 
 
-def table(found: list[Recording]) -> list[str]:
+def table(found: list[RecordingFile]) -> list[str]:
     """The recordings as aligned lines."""
     rows: list[tuple[str, ...]] = [("recording", "run", "arena", "drivers", "epochs", "success", "MB")]
     worlds = {(one.summary.arena, one.summary.arena_digest) for one in found if one.summary is not None}

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from phototaxis_sensors.fmu.log import MARK, one_line
+from phototaxis_fmu.log import MARK, one_line
 
 STATUS = ("OK", "a warning", "discard", "an error", "a fatal error", "pending")
 WARNING, FATAL = 1, 4
@@ -225,7 +225,7 @@ class Instance:
         return found
 
     def _load(self, number: int) -> Any:
-        from phototaxis_sensors.fmu.library import FMU2Library, FMU3Library
+        from phototaxis_fmu.library import FMU2Library, FMU3Library
 
         setup = self._setup
         try:

@@ -14,7 +14,7 @@ from typing import Literal
 from phototaxis.disk import try_file, write_whole
 from phototaxis.errors import UserError
 
-from phototaxis_sensors.fmu.examples import FOLDER, Example, Variable
+from phototaxis_fmu.examples import FOLDER, Example, Variable
 
 Version = Literal[2, 3]
 PLAIN_NAMES = [f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX" for version in (2, 3)]

@@ -9,12 +9,12 @@ from itertools import cycle
 from typing import NamedTuple
 
 from phototaxis.errors import ComponentFailed
-
-from phototaxis_sensors.fmu.host import Failed, Host, Team
-from phototaxis_sensors.fmu.rigs import Rig
-from phototaxis_sensors.fmu.start import bounds
-from phototaxis_sensors.fmu.wiring import Wire, Wiring, size
 from phototaxis_sensors.model import BuiltIn, Moment, SensorModel
+
+from phototaxis_fmu.host import Failed, Host, Team
+from phototaxis_fmu.rigs import Rig
+from phototaxis_fmu.start import bounds
+from phototaxis_fmu.wiring import Wire, Wiring, size
 
 RESTARTS, WITHIN = 3, 60.0
 """An FMU that fails more than so many times within so many seconds keeps failing."""

@@ -7,13 +7,13 @@ from typing import Any
 
 from phototaxis.arena import Arena, Light
 from phototaxis.errors import UserError
-
-from phototaxis_sensors.fmu.description import Fmu
-from phototaxis_sensors.fmu.sensors import FmuSensors
-from phototaxis_sensors.fmu.start import bounds
-from phototaxis_sensors.fmu.wiring import SUITES, Suite, connect, declared_unit
 from phototaxis_sensors.model import Past, SensorModel
 from phototaxis_sensors.scene import Scene
+
+from phototaxis_fmu.description import Fmu
+from phototaxis_fmu.sensors import FmuSensors
+from phototaxis_fmu.start import bounds
+from phototaxis_fmu.wiring import SUITES, Suite, connect, declared_unit
 
 EPISODE, EPISODES = 50, 4
 """Ticks and episodes of a dry run; each episode is gone through twice."""

@@ -2,11 +2,11 @@
 
 import numpy as np
 from phototaxis.messages import World
-
 from phototaxis_sensors.crowd import CrowdSuite
-from phototaxis_sensors.fmu.model import Stepped
-from phototaxis_sensors.fmu.rigs import Lamps
-from phototaxis_sensors.fmu.wiring import Wiring, size
+
+from phototaxis_fmu.model import Stepped
+from phototaxis_fmu.rigs import Lamps
+from phototaxis_fmu.wiring import Wiring, size
 
 
 class Crew:

@@ -12,11 +12,11 @@ from typing import Any
 from phototaxis.disk import write_whole
 from phototaxis.errors import ComponentFailed
 from phototaxis.ports import free_ports
-from phototaxis.viewer import rerun_program
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-STARTING = 20.0
+from phototaxis_recorder.viewer import STARTS_WITHIN_S, rerun_program
+
 SIZE = "1500x900"
 FRAMES_A_SECOND = 4
 ANIMATION_WIDTH = 900
@@ -44,7 +44,7 @@ def viewer(source: str) -> Iterator[Any]:
 
 
 def _connected(process: subprocess.Popen[bytes], port: str, said: Any) -> Any:
-    deadline = time.monotonic() + STARTING
+    deadline = time.monotonic() + STARTS_WITHIN_S
     while process.poll() is None and time.monotonic() < deadline:
         try:
             client = ViewerClient(f"rerun+http://127.0.0.1:{port}/proxy")

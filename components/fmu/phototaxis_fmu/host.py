@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import msgspec
 
-from phototaxis_sensors.fmu.description import UNPACKING, Fmu
-from phototaxis_sensors.fmu.instance import Setup, ends
-from phototaxis_sensors.fmu.log import Listener, Log
-from phototaxis_sensors.fmu.pace import Pace
-from phototaxis_sensors.fmu.wiring import Wire, Wiring, size
-from phototaxis_sensors.fmu.worker import BEGIN, FAILED, HEAD, LENGTH, REPLACED, STEP
+from phototaxis_fmu.description import UNPACKING, Fmu
+from phototaxis_fmu.instance import Setup, ends
+from phototaxis_fmu.log import Listener, Log
+from phototaxis_fmu.pace import Pace
+from phototaxis_fmu.wiring import Wire, Wiring, size
+from phototaxis_fmu.worker import BEGIN, FAILED, HEAD, LENGTH, REPLACED, STEP
 
 LOADING = 30.0
 """Seconds that an FMU may take to be loaded."""
@@ -107,7 +107,7 @@ class Host:
         folder = self._folder.name
         self._unpack(folder)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "phototaxis_sensors.fmu.worker"],
+            [sys.executable, "-m", "phototaxis_fmu.worker"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
         )  # fmt: skip
         self._guard = subprocess.Popen(

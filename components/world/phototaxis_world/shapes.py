@@ -1,7 +1,6 @@
-"""The arena's static shapes for pymunk, the same for physics and rays (needs the extra sim or sensors)."""
+"""The arena's static shapes for pymunk, the same for physics and rays (needs the extra world)."""
 
 import pymunk
-
 from phototaxis.arena import Arena
 
 

@@ -80,8 +80,8 @@ def info(argv: Sequence[str]) -> int:
     """Variables, units, causality, platforms, and what maps onto what."""
     about = "Show what is in an FMU and how it would be connected, without running any of it."
     options = parse(Info, argv, "phototaxis fmu info", about, positional=["file"])
-    from phototaxis_sensors.fmu.description import read
-    from phototaxis_sensors.fmu.report import describe, text
+    from phototaxis_fmu.description import read
+    from phototaxis_fmu.report import describe, text
 
     found = describe(read(options.file, options.allow_invalid))
     print(json.dumps(found) if options.json else text(found))
@@ -94,10 +94,10 @@ def check(argv: Sequence[str]) -> int:
     options = parse(Check, argv, "phototaxis fmu check", about, positional=["file"])
     from fmpy.validation import validate_fmu
 
-    from phototaxis_sensors.fmu.description import read
-    from phototaxis_sensors.fmu.report import connection, dry_run
-    from phototaxis_sensors.fmu.sensors import FmuSensors
-    from phototaxis_sensors.fmu.wiring import SUITES, connect
+    from phototaxis_fmu.description import read
+    from phototaxis_fmu.report import connection, dry_run
+    from phototaxis_fmu.sensors import FmuSensors
+    from phototaxis_fmu.wiring import SUITES, connect
 
     fmu = read(options.file, options.allow_invalid)
     remarks = validate_fmu(options.file)
@@ -142,8 +142,8 @@ def make(argv: Sequence[str]) -> int:
     """Build an example."""
     about = "Build a shipped example from its C source: light, lag, photodiode, sonar."
     options = parse(Build, argv, "phototaxis fmu build", about, positional=["name"])
-    from phototaxis_sensors.fmu.build import build
-    from phototaxis_sensors.fmu.examples import EXAMPLES
+    from phototaxis_fmu.build import build
+    from phototaxis_fmu.examples import EXAMPLES
 
     if options.name not in EXAMPLES:
         raise UserError(f"no example '{options.name}'; {known(options.name, EXAMPLES)}")

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from phototaxis.errors import UserError
 
-from phototaxis_sensors.fmu.description import Fmu
-from phototaxis_sensors.fmu.wiring import SUITES
+from phototaxis_fmu.description import Fmu
+from phototaxis_fmu.wiring import SUITES
 
 Pairs = dict[str, dict[str, str]]
 

@@ -15,10 +15,11 @@ from msgspec import Meta
 from phototaxis.disk import try_file
 from phototaxis.errors import ComponentFailed, Unavailable, UserError
 from phototaxis.options import parse
-from phototaxis.page import ViewerPage
-from phototaxis.ports import find_ports
-from phototaxis.recordings import recordings
-from phototaxis.viewer import rerun_program, silence_rerun, viewer_url
+from phototaxis.ports import find_ports, viewer_url
+
+from phototaxis_recorder.page import ViewerPage
+from phototaxis_recorder.summary import recordings
+from phototaxis_recorder.viewer import rerun_program, silence_rerun
 
 PORT = Annotated[int, Meta(ge=0, le=65535)]
 
@@ -127,7 +128,7 @@ def show(file: str, options: Options, web: bool) -> int:
 
 def draw(source: str, options: Options) -> int:
     """The picture that is asked for."""
-    from phototaxis_launcher.headless import picture
+    from phototaxis_recorder.headless import picture
 
     picture(source, Path(options.picture), options.seconds)
     return 0

@@ -7,8 +7,8 @@ from typing import Any
 from fmpy.model_description import ModelVariable
 from phototaxis.errors import UserError
 
-from phototaxis_sensors.fmu.description import Fmu
-from phototaxis_sensors.fmu.instance import Parameter
+from phototaxis_fmu.description import Fmu
+from phototaxis_fmu.instance import Parameter
 
 SETTABLE = ("parameter", "structuralParameter", "input")
 BITS = {"Integer": 32, "Int8": 8, "Int16": 16, "Int32": 32, "Int64": 64}

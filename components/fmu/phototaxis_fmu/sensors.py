@@ -7,21 +7,21 @@ from phototaxis.arena import Arena
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
-
-from phototaxis_sensors.fmu.assign import assign
-from phototaxis_sensors.fmu.build import compiled
-from phototaxis_sensors.fmu.crowd import Crew, FmuCrowd
-from phototaxis_sensors.fmu.description import Fmu, read, require_library
-from phototaxis_sensors.fmu.host import Failed, Host, Team, Terms, stay_on_one_cpu
-from phototaxis_sensors.fmu.log import SHOWN, SHOWN_ON_REQUEST, Log
-from phototaxis_sensors.fmu.model import FmuModel, Stepped
-from phototaxis_sensors.fmu.pace import pace
-from phototaxis_sensors.fmu.rigs import Beams, Filters, Lamps, Rig
-from phototaxis_sensors.fmu.wiring import SUITES, Wiring, connect
 from phototaxis_sensors.light import Sights
 from phototaxis_sensors.model import SensorModel
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.suite import Models, built_in
+
+from phototaxis_fmu.assign import assign
+from phototaxis_fmu.build import compiled
+from phototaxis_fmu.crowd import Crew, FmuCrowd
+from phototaxis_fmu.description import Fmu, read, require_library
+from phototaxis_fmu.host import Failed, Host, Team, Terms, stay_on_one_cpu
+from phototaxis_fmu.log import SHOWN, SHOWN_ON_REQUEST, Log
+from phototaxis_fmu.model import FmuModel, Stepped
+from phototaxis_fmu.pace import pace
+from phototaxis_fmu.rigs import Beams, Filters, Lamps, Rig
+from phototaxis_fmu.wiring import SUITES, Wiring, connect
 
 PROCESSES = 64
 """Most processes for an FMU of which a process can have only one instance."""

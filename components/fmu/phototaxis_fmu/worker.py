@@ -14,7 +14,7 @@ from contextlib import suppress
 
 import msgspec
 
-from phototaxis_sensors.fmu.instance import Instance, Setup, Voice, explain
+from phototaxis_fmu.instance import Instance, Setup, Voice, explain
 
 HEAD = struct.Struct("<qq")
 LENGTH = struct.Struct("<q")

@@ -8,9 +8,9 @@ from typing import NamedTuple
 from fmpy.model_description import ModelVariable, Unit
 from phototaxis.errors import UserError
 
-from phototaxis_sensors.fmu.description import Fmu
-from phototaxis_sensors.fmu.instance import Parameter
-from phototaxis_sensors.fmu.start import start_value
+from phototaxis_fmu.description import Fmu
+from phototaxis_fmu.instance import Parameter
+from phototaxis_fmu.start import start_value
 
 DIMENSIONS = ("kg", "m", "s", "A", "K", "mol", "cd")  # an angle has none
 REAL = {2: ("Real",), 3: ("Float64", "Float32")}

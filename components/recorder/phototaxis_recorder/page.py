@@ -11,14 +11,13 @@ from typing import cast
 
 from phototaxis.errors import ComponentFailed
 from phototaxis.ports import free_ports
-from phototaxis.viewer import rerun_program
+
+from phototaxis_recorder.viewer import STARTS_WITHIN_S, rerun_program
 
 FILES = ("/", "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/apple-touch-icon.png")
 """Everything that the web viewer is made of."""
 ELSEWHERE = re.compile(rb"""<link[^>]*href="https://[^>]*>""")
 """Hints in the page to connect to others, which a content security policy does not cover."""
-STARTING = 20.0
-"""Seconds within which Rerun's program must hand out the web viewer."""
 
 
 class ViewerPage(socketserver.ThreadingTCPServer):
@@ -114,9 +113,9 @@ def _viewer_files() -> dict[str, tuple[str, bytes]]:
 
 def _fetch(port: int, path: str) -> tuple[str, bytes]:
     """Type and content of a file, from a program that may still be starting."""
-    deadline = time.monotonic() + STARTING
+    deadline = time.monotonic() + STARTS_WITHIN_S
     while True:
-        connection = HTTPConnection("127.0.0.1", port, timeout=STARTING)
+        connection = HTTPConnection("127.0.0.1", port, timeout=STARTS_WITHIN_S)
         try:
             connection.request("GET", path)
             answer = connection.getresponse()

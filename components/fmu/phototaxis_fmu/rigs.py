@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from phototaxis.arena import Arena
-
-from phototaxis_sensors.fmu.wiring import Wiring, size
 from phototaxis_sensors.light import Sights
 from phototaxis_sensors.model import Moment, SensorModel
+
+from phototaxis_fmu.wiring import Wiring, size
 
 
 class Rig(Protocol):

@@ -1,12 +1,10 @@
-"""Where the live view is found, and the program that shows it."""
+"""The program that shows recordings: where it is, and that it reports nothing."""
 
 import os
 from pathlib import Path
 
-
-def viewer_url(web_port: int, grpc_port: int) -> str:
-    """The whole address of the web viewer on this machine, already connected to the recording."""
-    return f"http://localhost:{web_port}/?url=rerun%2Bhttp%3A%2F%2Flocalhost%3A{grpc_port}%2Fproxy"
+STARTS_WITHIN_S = 20.0
+"""Seconds that it gets to start."""
 
 
 def rerun_program() -> Path:
