@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import Any, Protocol
 
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError
@@ -10,8 +10,9 @@ from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
 
 from phototaxis_sensors.crowd import CrowdSuite
+from phototaxis_sensors.many import SuiteOfMany
 from phototaxis_sensors.scene import Scene
-from phototaxis_sensors.suite import Models, built_in
+from phototaxis_sensors.suite import Models, SensorSuite, Suite, built_in
 
 
 class Choice(Protocol):
@@ -37,6 +38,21 @@ class BuiltInChoice:
     def crowd(self, world: World, count: int) -> CrowdSuite:
         """The sensors of any number of robots."""
         return CrowdSuite(world)
+
+
+def make_suite(choice: Choice, world: World) -> Suite[Any, Any]:
+    """The suite of a world.
+
+    Raises
+    ------
+    UserError
+        when the models remember and there are many robots, whose episodes begin at different ticks.
+    """
+    if world.robots == 1:
+        return SensorSuite(world, choice)
+    if choice.remembers:
+        raise UserError(f"an FMU senses for one robot; this world has {world.robots}: start it without --robots")
+    return SuiteOfMany(choice.crowd(world, world.robots), world.robots)
 
 
 @contextmanager
