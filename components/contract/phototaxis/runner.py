@@ -38,6 +38,7 @@ class Runner:
     store : where its journal and checkpoint are; None for a component that keeps nothing.
     log : gathers the rows that it wants recorded; None for a component without any.
     clock : seconds of a monotonic clock.
+    own : carries out the effects that this machine has for itself.
     """
 
     def __init__(
@@ -47,6 +48,7 @@ class Runner:
         store: Store | None = None,
         log: Chunks | None = None,
         clock: Callable[[], float] = time.monotonic,
+        own: Callable[[m.Own], object] | None = None,
     ):
         self._bus, self._machine, self._store, self._log = bus, machine, store or Store(), log
         self._clock, self._running = clock, True
@@ -65,6 +67,7 @@ class Runner:
             m.Flush: lambda _: log and log.flush(),
             m.Stop: self._stop,
         }
+        self._own = own
 
     def run(self) -> None:
         """Run until the machine stops.
@@ -94,7 +97,10 @@ class Runner:
 
     def carry(self, effect: m.Effect) -> None:
         """Do one thing."""
-        self._carry[type(effect)](effect)
+        if isinstance(effect, m.Own) and self._own is not None:
+            self._own(effect)
+        else:
+            self._carry[type(effect)](effect)
 
     def _write(self, effect: m.Begin | m.Append | m.Save) -> None:
         fault = self._store.carry(effect)
