@@ -1,5 +1,6 @@
 """The recorder's machine: each chunk once and in its order, whatever is dropped, late, or written by another."""
 
+import math
 import random
 from collections.abc import Sequence
 from functools import partial
@@ -94,7 +95,7 @@ def recording() -> Play:
 
 def test_a_simulation_brings_a_run_which_is_asked_for_all_it_has():
     play = Play()
-    assert play.machine.deadline == float("inf")
+    assert play.machine.deadline == math.inf
     assert play.tell(SIM) == [Ask("world", "world")]
     effects = play.tell(world())
     opened, report, *asked = effects
@@ -216,24 +217,45 @@ def test_another_run_is_another_recording():
     play.tell(came(0))
     assert play.tell(came(1, run="s")) == [Ask("world", "world")]
     assert play.tell(came(1)) == [], "the run that is recorded goes on meanwhile"
-    closed, opened, *_ = play.tell(world("s"))
+    rest = questions(play.tell(world("s")))
+    assert [one.topic for one in rest] == list(LOGS), "what is left of it comes first"
+    assert play.tell(came(2, run="s"), answer(rest[0], log(2), log(3, run="s")), answer(rest[1])) == []
+    closed, opened = play.tell(answer(rest[2]))
     assert closed == Close()
     assert isinstance(opened, Open)
     assert opened.world.run == "s"
-    assert play.numbers() == [0, 1]
-    play.tell(came(2, run="r"), world("s"))
-    assert play.numbers() == [0, 1], "what is left of the former run is not taken"
-
-
-def test_an_answer_to_a_question_about_a_former_run_is_dropped():
-    play = recording()
-    (old,) = questions(play.tell(came(3)))
-    play.tell(came(0, run="s"))
-    asked = questions(play.tell(world("s")))
-    play.tell(came(2, run="s"), answer(old, log(0), log(1, run="s"), log(2)))
-    assert play.numbers() == []
-    play.tell(answer(next(one for one in asked if one.topic == "log/sim"), log(0, run="s"), log(1, run="s")))
     assert play.numbers() == [0, 1, 2]
+    assert play.machine.deadline == play.now
+    sim, *_ = questions(play.tell(TIME))
+    play.tell(answer(sim, log(2), log(3, run="s")))
+    assert play.written[-1] == ("log/sim", "sim", 3)
+
+
+def completing() -> tuple[Play, list[Ask]]:
+    """The run "r" is recorded, another one is known, and what is left of "r" is asked for."""
+    play = recording()
+    play.tell(came(0), came(0, run="s"))
+    return play, questions(play.tell(world("s")))
+
+
+def test_the_next_run_waits_for_the_open_questions_about_the_present_one():
+    play = recording()
+    (gap,) = questions(play.tell(came(3)))
+    play.tell(came(0, run="s"))
+    rest = questions(play.tell(world("s")))
+    assert play.tell(came(1, run="t"), world("t"), *map(answer, rest)) == [], "one run at a time"
+    closed, opened = play.tell(answer(gap, log(0), log(1), log(2)))
+    assert closed == Close()
+    assert isinstance(opened, Open)
+    assert opened.world.run == "s"
+    assert play.numbers() == [0, 1, 2, 3]
+
+
+def test_a_recorder_that_stops_completes_the_run_that_it_records():
+    play, rest = completing()
+    asked = questions(play.tell(STOP))
+    assert [one.topic for one in asked] == list(LOGS)
+    assert play.tell(*map(answer, [*rest, *asked])) == [Close(), Stop()]
 
 
 def test_a_stray_chunk_of_another_run_changes_nothing():
@@ -251,9 +273,9 @@ def test_without_a_world_a_simulation_is_asked_again_after_a_second():
     assert play.tell(NO_WORLD) == []
     assert play.machine.deadline == play.now + ASK_EVERY_S
     assert play.tell(TIME, after=ASK_EVERY_S) == [Ask("world", "world")]
-    assert play.machine.deadline == float("inf")
+    assert play.machine.deadline == math.inf
     play.tell(NO_WORLD, Event("gone", ("sim", "sim")))
-    assert play.machine.deadline == float("inf")
+    assert play.machine.deadline == math.inf
     assert play.tell(TIME, after=ASK_EVERY_S) == []
 
 
@@ -303,7 +325,6 @@ def test_a_world_that_is_asked_for_is_waited_for_at_the_end(found: Event):
     assert play.tell(came(0, run="s")) == []
     effects = play.tell(found)
     assert [one.topic for one in questions(effects)] == list(LOGS)
-    assert (Close() in effects) == (found == world("s"))
     answers = [answer(asked) for asked in questions(effects)]
     assert play.tell(*answers) == [Close(), Stop()]
 
@@ -311,7 +332,7 @@ def test_a_world_that_is_asked_for_is_waited_for_at_the_end(found: Event):
 def test_a_first_world_that_comes_at_the_end_is_recorded():
     play = Play()
     play.tell(SIM, STOP)
-    opened, _, *asked = play.tell(world())
+    opened, *asked = [one for one in play.tell(world()) if one != Report()]
     assert isinstance(opened, Open)
     answers = [answer(one, *([log(0)] if one.topic == "log/sim" else [])) for one in questions(asked)]
     assert play.tell(*answers) == [Close(), Stop()]
@@ -351,11 +372,51 @@ def test_every_chunk_is_written_once_and_in_order_whatever_is_lost(seed: int):
     assert play.numbers() == list(range(300))
 
 
+@pytest.mark.parametrize("seed", range(30))
+def test_whatever_happens_it_records_one_run_at_a_time_never_spins_and_ends(seed: int):
+    draw, play, opened = random.Random(seed), Play(), list[str]()
+    asked: list[Ask] = []
+
+    def tell(event: Event, after: float) -> list[Effect]:
+        effects = play.tell(event, after=after)
+        asked.extend(questions(effects))
+        for effect in effects:
+            if isinstance(effect, Open):
+                opened.append(effect.world.run)
+            elif isinstance(effect, Close):
+                opened.append("closed")
+        return effects
+
+    def reply() -> list[Effect]:
+        one = asked.pop(draw.randrange(len(asked)))
+        if one.topic == "world":
+            return tell(draw.choice([NO_WORLD, world("r"), world("s")]), 0.01)
+        return tell(answer(one, *[log(seq, run=draw.choice("rs")) for seq in range(draw.randrange(4))]), 0.01)
+
+    for _ in range(300):
+        who = draw.choice([("sim", "sim"), ("agent", "a"), ("agent", "b")])
+        chunk = came(draw.randrange(20), draw.choice(["sim", "a", "b"]), draw.choice("rrrs"), topic=draw.choice(LOGS))
+        tell(draw.choice([TIME, Event("alive", who), Event("gone", who), chunk, chunk]), draw.choice([0.0, 0.01, 0.5]))
+        if asked and draw.random() < 0.5:
+            reply()
+        wait = max(play.machine.deadline - play.now, 0.0)
+        tell(TIME, wait if wait < math.inf else 0.0)
+        assert play.machine.deadline > play.now
+    last = tell(STOP, 0.0)
+    while asked and Stop() not in last:
+        last = reply()
+    assert last[-1] == Stop()
+    assert opened[1::2] == ["closed"] * (len(opened) // 2)
+    assert "closed" not in opened[::2]
+
+
 def test_every_transition_is_taken():
     scenarios = [
         test_without_a_world_a_simulation_is_asked_again_after_a_second,
         test_another_run_is_another_recording,
         test_a_stray_chunk_of_another_run_changes_nothing,
+        test_the_next_run_waits_for_the_open_questions_about_the_present_one,
+        test_a_recorder_that_stops_completes_the_run_that_it_records,
         test_at_its_end_it_asks_once_more_and_closes,
         test_without_a_run_it_stops_at_once,
         test_a_first_world_that_comes_at_the_end_is_recorded,

@@ -54,10 +54,12 @@ class Phase(StrEnum):
     JOINING = "joining"
     """It has asked for the world, and goes on recording the run that it records, if any."""
     RECORDING = "recording"
+    COMPLETING = "completing"
+    """It knows the world of another run, and has asked everybody for what is left of the present one."""
     JOINING_TO_END = "joining to end"
     """It is to stop, and waits for the world that it has asked for."""
     ENDING = "ending"
-    """It has asked everybody for what is left."""
+    """It is to stop, and has asked everybody for what is left."""
     ENDED = "ended"
 
 
@@ -65,7 +67,8 @@ class Input(StrEnum):
     """What may happen to it."""
 
     NEWS = "simulation or another run's chunk"
-    WORLD = "world of another run"
+    WORLD = "world"
+    OTHER_WORLD = "world of another run"
     NO_OTHER = "no other world"
     NO_WORLD = "no world"
     STOP = "stop"
@@ -78,14 +81,19 @@ TABLE = {
     (Phase.JOINING, Input.NEWS): Phase.JOINING,
     (Phase.JOINING, Input.NO_WORLD): Phase.IDLE,
     (Phase.JOINING, Input.WORLD): Phase.RECORDING,
+    (Phase.JOINING, Input.OTHER_WORLD): Phase.COMPLETING,
     (Phase.JOINING, Input.NO_OTHER): Phase.RECORDING,
     (Phase.JOINING, Input.STOP): Phase.JOINING_TO_END,
     (Phase.RECORDING, Input.NEWS): Phase.JOINING,
     (Phase.RECORDING, Input.STOP): Phase.ENDING,
+    (Phase.COMPLETING, Input.NEWS): Phase.COMPLETING,
+    (Phase.COMPLETING, Input.ALL): Phase.RECORDING,
+    (Phase.COMPLETING, Input.STOP): Phase.ENDING,
     (Phase.JOINING_TO_END, Input.NEWS): Phase.JOINING_TO_END,
     (Phase.JOINING_TO_END, Input.STOP): Phase.JOINING_TO_END,
     (Phase.JOINING_TO_END, Input.NO_WORLD): Phase.ENDING,
     (Phase.JOINING_TO_END, Input.WORLD): Phase.ENDING,
+    (Phase.JOINING_TO_END, Input.OTHER_WORLD): Phase.ENDING,
     (Phase.JOINING_TO_END, Input.NO_OTHER): Phase.ENDING,
     (Phase.ENDING, Input.NEWS): Phase.ENDING,
     (Phase.ENDING, Input.STOP): Phase.ENDING,
@@ -100,6 +108,8 @@ class Gathering:
         self._phase = Transitions(TABLE, Phase.IDLE)
         self._run = ""
         """The run that is recorded; "" for none."""
+        self._next: World | None = None
+        """The world of another run, which is recorded next."""
         self._readers: dict[str, LogReader] = {}
         self._alive: set[str] = set()
         self._simulations: set[str] = set()
@@ -117,8 +127,9 @@ class Gathering:
         """What follows from an event."""
         before = self._phase.state
         effects = [*self._take(event, now), *self._due(now)]
-        if self._phase.state is Phase.ENDING:
-            effects += self._end(begin=before is not Phase.ENDING)
+        after = self._phase.state
+        if after in (Phase.COMPLETING, Phase.ENDING):
+            effects += self._complete(now, begin=before is not after)
         return effects
 
     def _take(self, event: Event, now: float) -> Iterator[Effect]:
@@ -151,7 +162,8 @@ class Gathering:
 
     def _answered(self, answer: Answer, now: float) -> Iterator[Effect]:
         if answer.tag == "world":
-            yield from self._join(answer.first, now)
+            if self._phase.state in (Phase.JOINING, Phase.JOINING_TO_END):
+                yield from self._join(answer.first, now)
             return
         for reader in self._readers.values():
             if answer.tag in reader.open:
@@ -159,18 +171,21 @@ class Gathering:
 
     def _join(self, world: World | None, now: float) -> Iterator[Effect]:
         """Record the run of a world, if it is another one."""
-        if world is not None and world.run != self._run:
-            if self._run:
-                yield Close()
-            yield Open(world=world)
-            self._run, self._keep_at, self._ask_at = world.run, now + KEEP_EVERY_S, now
-            self._readers = {topic: LogReader(topic, world.run, self._tags, self._alive) for topic in LOGS}
-            given = Input.WORLD
+        if world is None or world.run == self._run:
+            self._ask_at = self._ask_at if self._run else now + ASK_EVERY_S
+            self._phase.take(Input.NO_OTHER if self._run else Input.NO_WORLD)
         elif self._run:
-            given = Input.NO_OTHER
+            self._next = world
+            self._phase.take(Input.OTHER_WORLD)
         else:
-            given, self._ask_at = Input.NO_WORLD, now + ASK_EVERY_S
-        self._phase.take(given)
+            self._phase.take(Input.WORLD)
+            yield self._open(world, now)
+
+    def _open(self, world: World, now: float) -> Open:
+        """Begin with a run; everybody is asked at once for all there is."""
+        self._run, self._keep_at, self._ask_at = world.run, now + KEEP_EVERY_S, now
+        self._readers = {topic: LogReader(topic, world.run, self._tags, self._alive) for topic in LOGS}
+        return Open(world=world)
 
     def _due(self, now: float) -> Iterator[Effect]:
         """What is done at intervals."""
@@ -192,13 +207,15 @@ class Gathering:
             if late and not reader.open:
                 yield from reader.ask()
 
-    def _end(self, begin: bool) -> Iterator[Effect]:
-        """Ask everybody for what is left; when all answers are there, stop."""
+    def _complete(self, now: float, begin: bool) -> Iterator[Effect]:
+        """Ask everybody for what is left; when all answers are there, go to the next run or stop."""
         for reader in self._readers.values() if begin else ():
             yield from reader.ask()
         if any(reader.open for reader in self._readers.values()):
             return
-        self._phase.take(Input.ALL)
         if self._run:
             yield Close()
-        yield Stop()
+        if self._phase.take(Input.ALL) is Phase.RECORDING and self._next is not None:
+            yield self._open(self._next, now)
+        else:
+            yield Stop()
