@@ -173,6 +173,15 @@ def test_a_restarted_writer_follows_one_that_is_gone():
     assert play.written == [(agent, "a", 0), (agent, "b", 0)]
 
 
+def test_a_restarted_writer_whose_first_chunks_are_missing_is_asked_for_them():
+    play, agent = recording(), "log/agent"
+    play.tell(came(0, "a", topic=agent), Event("gone", ("agent", "a")))
+    (asked,) = questions(play.tell(came(1, "b", first=8, topic=agent)))
+    assert asked.request == LogRequest(seq=0, writer="b")
+    play.tell(answer(asked, log(0, "b", first=4), log(1, "b", first=8)))
+    assert play.written == [(agent, "a", 0), (agent, "b", 0), (agent, "b", 1)]
+
+
 def test_a_late_recorder_takes_the_chunks_of_several_writers_by_their_ticks():
     play = Play()
     asked = questions(play.tell(SIM, Event("alive", ("agent", "b")), world()))

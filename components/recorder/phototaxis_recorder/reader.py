@@ -75,7 +75,7 @@ class LogReader:
             self._writer = chunk.writer
             if former not in ("", chunk.writer):
                 yield from self._ask(former)  # what it still has comes before
-            elif chunk.seq > self._expected.get(chunk.writer, 0):
+            if not self.open and chunk.seq > self._expected.get(chunk.writer, 0):
                 yield from self._ask(chunk.writer)
             if not self.open:
                 yield from self._write(self._held.pop(0))
