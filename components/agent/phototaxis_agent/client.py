@@ -70,13 +70,14 @@ class AgentClient:
         if event.topic == "checkpoint":
             return self._bequeath(event)
         if event.topic == "unwritten":
-            return self._keeping.unwritten(event.message, self._agent, now)
+            return self._keeping.unwritten(event.message, self.agent, now)
         if event.topic == "alive" and event.message[0] == "sim":
             self.seat.simulation_is_back()
         return self._leave() if event.topic == "stop" else []
 
     @property
-    def _agent(self) -> Answerer | None:
+    def agent(self) -> Answerer | None:
+        """The agent, once it has joined a run."""
         return None if self._session is None else self._session.agent
 
     def _readings(self, readings: Readings | ReadingsOfMany, now: float) -> list[Effect]:
@@ -180,7 +181,7 @@ class AgentClient:
     def _answer(self, answer: Answer, now: float) -> list[Effect]:
         """What came of a question."""
         if answer.tag == RELEASE:
-            saved = [] if self._agent is None else self._keeping.save(self._agent, now, last=True)
+            saved = [] if self.agent is None else self._keeping.save(self.agent, now, last=True)
             return [*saved, Stop()]
         if self.seat.place is Place.LEAVING:
             return []
@@ -236,7 +237,7 @@ class AgentClient:
         request: CheckpointRequest | None = event.message
         if request is None or request.agent != self.seat.ident or event.reply is None:
             return []
-        return [Reply(event.reply, bequest(self._agent, request))]
+        return [Reply(event.reply, bequest(self.agent, request))]
 
     def _leave(self) -> list[Effect]:
         if self._session is None:
