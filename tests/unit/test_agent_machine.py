@@ -1,6 +1,7 @@
 """The agent's machine without a bus: joins, answers once, follows, inherits, keeps itself, leaves."""
 
 from collections.abc import Callable
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -42,6 +43,7 @@ from phototaxis.messages import (
 from phototaxis.seat_client import Place
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.keeping import SAVE_EVERY_S, Kept
+from phototaxis_agent.rows import AgentLogs
 from phototaxis_agent.setup import Setup, make_setup
 from phototaxis_lab.loop import Loop
 from phototaxis_sensors.suite import SensorSuite
@@ -58,7 +60,7 @@ class Desk:
         agent = (setup or make_setup()).agent
         self.machine = AgentClient(ident, lambda world: agent(world), **options)
         self.effects: list[Effect] = []
-        self.asked: list[Ask] = []
+        self.asked: list[Any] = []
         self.full: set[type] = set()
         """Kinds of effects that the disk does not take."""
         self.journal: list[bytes] | None = None
@@ -165,6 +167,7 @@ def kinds(effects: list[Effect]) -> list[type]:
 
 def test_it_joins_with_the_readings_that_wait_and_learns_what_one_process_learns(world):
     desk, play = Desk(world), Play(world)
+    assert desk.give(Event("answer", Answer("inherit", []))) == [], "of an earlier process"
     first = play.readings("a")
     assert kinds(desk.give(Event("readings", first))) == [Ask]
     assert desk.give(Event("readings", first)) == [], "one question is enough"
@@ -252,6 +255,32 @@ def test_a_killed_agent_is_where_it_was(world, saved, torn):
     assert Begin not in kinds(effects)
     assert again.commands() == desk.commands()[-1:]
     assert again.checkpoint() == desk.checkpoint()
+
+
+def test_entries_that_the_checkpoint_contains_are_not_learned_from_again(world):
+    desk, play = Desk(world, keeps=True), Play(world)
+    play.drive(desk, 30)
+    assert desk.journal is not None
+    frames = desk.journal
+    desk.now += SAVE_EVERY_S
+    play.drive(desk, 1)
+    again = continued(world, desk, [*frames, *desk.journal[1:]])
+    again.read(play.readings(""))
+    assert decode(again.checkpoint(), "again")[0] == decode(desk.checkpoint(), "desk")[0]
+
+
+def test_what_it_was_at_each_tick_is_recorded_with_its_values_now_and_then(world):
+    desk, play, seconds = Desk(world), Play(world), [1.0]
+    play.drive(desk, 3)
+    rows = [one for one in desk.effects if isinstance(one, Record)]
+    make = AgentLogs("a", lambda: seconds[0])
+    columns = list(zip(*(one.row for one in rows), strict=True))
+    first, second = make(0, rows[0].head, columns), make(1, rows[0].head, columns)
+    assert (first.run, first.seq, first.writer, first.learner, first.percept) == ("r", 0, "a", "qtable", "simple")
+    assert (first.tick, len(first.values), sum(first.visits)) == ([0, 1, 2], 24 * 9, 3)
+    assert (second.tick, second.values) == ([0, 1, 2], [])
+    seconds[0] += 1.0
+    assert make(2, rows[0].head, columns).values
 
 
 def test_a_journal_of_another_run_does_not_count(world):
@@ -349,7 +378,7 @@ def hand_over(driver: Desk, heir: Desk, ident: str = "a") -> list[Effect]:
     """Answer what the heir asks of the driver as that one does."""
     question = heir.asked[-1]
     assert (question.topic, question.agent) == ("checkpoint", ident)
-    replies: list[CheckpointReply] = []
+    replies: list[object] = []
     driver.give(Event("checkpoint", question.request, replies.append))
     told = [one for one in driver.effects if isinstance(one, Reply)][-1]
     assert isinstance(told.message, CheckpointReply)
@@ -517,6 +546,12 @@ def test_many_robots_are_driven_by_the_same_machine(world):
     (refused,) = desk.give(Event("crowd/readings", msgspec.structs.replace(readings, tick=1, sonar=b"")))
     assert isinstance(refused, Refuse)
     assert desk.give(Event("readings", Play(world).readings("a"))) == [], "those of one robot do not belong here"
+    taking = taker(many)
+    taking.give(Event("crowd/readings", readings))
+    taking.answer(many)
+    assert [one.topic for one in taking.asked] == ["control"], "nobody is its equal before it sits down"
+    taking.give(Event("crowd/readings", msgspec.structs.replace(readings, driver="b")))
+    assert taking.asked[-1].agent == "a"
     heir = Desk(many, mode="stand by")
     heir.give(Event("crowd/readings", readings))
     with pytest.raises(UserError, match="a standby keeps in step with the driver of one robot; this world has 3"):

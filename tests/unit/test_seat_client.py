@@ -1,6 +1,7 @@
 """The seat's client: every transition of its table, and when it asks for what."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from making import readings
@@ -20,7 +21,7 @@ WAYS = {
     Place.LEAVING: [Seen.LEFT],
 }
 """How each place is reached."""
-NAMES = {
+NAMES: dict[Seen, dict[str, Any]] = {
     Seen.NAMED: {"driver": "me"},
     Seen.FREE: {"driver": ""},
     Seen.TAKEN: {"driver": "other"},
@@ -59,9 +60,14 @@ def test_the_documented_transitions_are_the_real_ones():
     assert diagram(TABLE) in PAGE.read_text()
 
 
+def requests(effects: list[Effect]) -> list[Any]:
+    """What the simulation is asked."""
+    return [one.request for one in effects if isinstance(one, Ask)]
+
+
 def asked(effects: list[Effect]) -> list[str]:
     """The verbs that are asked."""
-    return [one.request.verb for one in effects if isinstance(one, Ask)]
+    return [one.verb for one in requests(effects)]
 
 
 def said(effects: list[Effect]) -> str:
@@ -98,9 +104,8 @@ def test_who_claims_waits_for_a_driver_and_says_so_once():
 def test_a_simulation_that_is_back_is_asked_anew(mode: Mode, line):
     client = SeatClient("me", mode, at=5)
     for now in (0.0, 1.0):
-        (question,) = client.see(readings(driver="a"), now)
-        assert isinstance(question, Ask)
-        assert (question.request.verb, question.request.agent, question.request.at) == (mode, "me", 5)
+        (request,) = requests(client.see(readings(driver="a"), now))
+        assert (request.verb, request.agent, request.at) == (mode, "me", 5)
         assert said(client.answered(reply(True))) == f"{line}; a drives at tick 7"
         assert client.see(readings(driver="a"), now + 0.9) == []
         client.simulation_is_back()
@@ -146,6 +151,7 @@ def test_an_answer_that_names_us_counts_before_any_readings():
 
 def test_who_leaves_gives_the_seat_back():
     client = SeatClient("me")
-    (question,) = client.leave()
-    assert isinstance(question, Ask)
-    assert (question.tag, question.request.verb, question.request.agent) == (RELEASE, "release", "me")
+    effects = client.leave()
+    (request,) = requests(effects)
+    assert (request.verb, request.agent) == ("release", "me")
+    assert [one.tag for one in effects if isinstance(one, Ask)] == [RELEASE]

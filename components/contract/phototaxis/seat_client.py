@@ -101,7 +101,8 @@ class SeatClient:
     """
 
     def __init__(self, ident: str, mode: Mode = "claim", at: int = 0):
-        self.ident, self.mode, self._at = ident, mode, at
+        self.ident, self._at = ident, at
+        self.mode: Mode = mode
         self._place = Transitions(TABLE, Place.SEEKING)
         self._known = self._has_driven = False
         self._asked: Mode | None = None
