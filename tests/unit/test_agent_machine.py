@@ -429,6 +429,35 @@ def test_a_standby_that_missed_a_tick_inherits_again(world):
     assert digest(heir.checkpoint()) == digest(driver.checkpoint())
 
 
+def test_a_standby_that_missed_the_tick_before_it_sits_down_asks_once_more(world):
+    driver, play = Desk(world), Play(world)
+    heir = Desk(world, mode="stand by", ident="b")
+    follow(world, play, driver, heir)
+    hand_over(driver, heir)
+    hand_over(driver, heir)
+    play.drive(driver, 1)
+    heir.read(play.readings("b"))  # the driver leaves in good order
+    assert heir.commands() == []
+    hand_over(driver, heir)
+    play.apply(heir.commands()[-1])
+    play.drive(heir, 20, driver="b")
+    assert digest(heir.checkpoint()) == alone(world, play.simulation.state.tick)
+
+
+def test_a_stray_message_of_another_run_does_not_disturb_an_inheritance(world):
+    driver, heir, play = Desk(world), taker(world), Play(world)
+    follow(world, play, driver, heir)
+    hand_over(driver, heir)
+    heir.read(play.readings("b"))
+    (question,) = heir.asked
+    assert kinds(heir.read(play.readings("b"), run="other")) == [Ask]
+    heir.asked = [question]
+    hand_over(driver, heir)
+    play.apply(heir.commands()[-1])
+    play.drive(heir, 20, driver="b")
+    assert digest(heir.checkpoint()) == alone(world, play.simulation.state.tick)
+
+
 def test_a_standby_whose_driver_does_not_answer_learns_in_its_shadow_and_asks_again(world):
     driver, play = Desk(world), Play(world)
     heir = Desk(world, mode="stand by", ident="b")

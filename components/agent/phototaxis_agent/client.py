@@ -130,7 +130,7 @@ class AgentClient:
         said = Say(f"drives from tick {readings.tick} on")
         following = session.following
         predecessor, following.predecessor = following.predecessor, ""
-        if not predecessor or before is Place.IN_STEP:
+        if not predecessor or (before is Place.IN_STEP and not session.missed(readings)):
             return [said, *self._drive(session, readings, now)]
         self._wait(readings)
         return [said, *following.ask(predecessor, now)]
@@ -139,7 +139,7 @@ class AgentClient:
         """Learn from what another driver does; a standby of its kind keeps in step with it."""
         following, seat = session.following, self.seat
         effects: list[Effect] = following.ask(following.leader, now, probe=True) if fresh else []
-        if seat.place is Place.IN_STEP and readings.tick > session.agent.tick[1] + 1:
+        if seat.place is Place.IN_STEP and session.missed(readings):
             seat.learn(Seen.GAP)
         if fresh and seat.place is not Place.IN_STEP:
             self._wait(readings)
@@ -210,17 +210,19 @@ class AgentClient:
     def _meet(self, world: World | None, now: float) -> list[Effect]:
         """Enter the run of a world, if its readings wait."""
         self._asks_world = False
-        if world is None or all(readings.run != world.run for readings in self._waiting):
-            self._waiting.clear()
+        session, waiting = self._session, self._waiting
+        known = None if session is None else session.world.run
+        if world is None or world.run == known or all(readings.run != world.run for readings in waiting):
+            self._waiting = deque((one for one in waiting if one.run == known), MAX_WAITING)
             return []
         effects: list[Effect] = [Flush()]
-        if self._session is None:
+        if session is None:
             refuse_mode(world, self.seat.mode)
             agent = self._make(world)
             agent.author = self.seat.ident
             effects += restored(agent, self._kept, world.arena)
         else:
-            agent = self._session.agent
+            agent = session.agent
             agent.enter(world.arena)
         session = self._session = Session(world, agent)
         self.seat.enter()

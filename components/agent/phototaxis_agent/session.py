@@ -1,6 +1,6 @@
 """The agent in one run."""
 
-from phototaxis.messages import World
+from phototaxis.messages import Readings, ReadingsOfMany, World
 from phototaxis.topics import TOPICS, step_topics
 
 from phototaxis_agent.answering import Answerer, answering
@@ -21,3 +21,7 @@ class Session:
     def resume(self) -> None:
         """Answer from what the agent has been restored to."""
         self.answering = answering(self.world, self.agent)
+
+    def missed(self, readings: Readings | ReadingsOfMany) -> bool:
+        """Whether the agent has not gone through every tick before this one."""
+        return readings.tick > self.agent.tick[1] + 1
