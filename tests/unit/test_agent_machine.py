@@ -10,7 +10,7 @@ from phototaxis.arena import Arena
 from phototaxis.checkpoint import decode, encode, learner_hash
 from phototaxis.columns import COUNT, FLAG, pack
 from phototaxis.errors import Unavailable, UserError
-from phototaxis.journal import GIVEN_UP
+from phototaxis.journal import GIVEN_UP, Journal
 from phototaxis.machine import (
     STOP,
     Answer,
@@ -41,6 +41,8 @@ from phototaxis.messages import (
     World,
 )
 from phototaxis.seat_client import Place
+from phototaxis.store import Store
+from phototaxis_agent import kept
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.keeping import SAVE_EVERY_S, Kept
 from phototaxis_agent.rows import AgentLogs
@@ -255,6 +257,30 @@ def test_a_killed_agent_is_where_it_was(world, saved, torn):
     assert Begin not in kinds(effects)
     assert again.commands() == desk.commands()[-1:]
     assert again.checkpoint() == desk.checkpoint()
+
+
+def test_a_torn_journal_on_disk_is_continued_where_it_tears(world, tmp_path):
+    path, play, desk = tmp_path / "c.journal", Play(world), Desk(world, keeps=True)
+    store = Store(Journal(path), tmp_path / "c.npz")
+    play.drive(desk, 30)
+    readings = play.readings("a")
+    desk.read(readings)
+    for effect in desk.effects:
+        if isinstance(effect, (Begin, Append)):
+            assert store.carry(effect) is None
+    path.write_bytes(path.read_bytes()[:-3])
+    journal = Journal(path)
+    found = kept.read(tmp_path / "c.npz", False, journal)
+    assert (found.checkpoint, len(found.frames)) == (None, 31)
+    again = Desk(world, keeps=True, kept=found)
+    effects = again.read(readings)
+    assert again.checkpoint() == desk.checkpoint()
+    continued = Store(journal, None)
+    assert [continued.carry(one) for one in effects if isinstance(one, Append)] == [None]
+    assert len(Journal(path).read()) == 32
+    assert kept.read(None, False, Journal(path)) == Kept(), "without --resume an older journal does not count"
+    with pytest.raises(UserError, match="no such checkpoint"):
+        kept.read(tmp_path / "c.npz", True, None)
 
 
 def test_entries_that_the_checkpoint_contains_are_not_learned_from_again(world):
