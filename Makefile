@@ -38,7 +38,7 @@ bench: setup ## measure rates and costs on this machine
 	@$(BIN)/python benchmarks/run.py
 
 storm: setup ## schedules of faults on a simulated network, SEEDS=FIRST:LAST; one seed is shrunk where it fails
-	@cd tests && ../$(BIN)/python -m simulated.storm $(SEEDS)
+	@PYTHONPATH=tests $(BIN)/python -m simulated $(SEEDS)
 
 picture: setup ## the README's picture and animation, from a real run
 	@scripts/picture

@@ -1,9 +1,8 @@
 """Runs schedules and compares each with the run in one process; a schedule that fails is made as short as it can be.
 
-`python -m simulated.storm 0:1000` in the folder `tests` runs a range of seeds.
+`make storm SEEDS=0:1000` runs a range of seeds.
 """
 
-import sys
 import tempfile
 import time
 from collections import Counter
@@ -145,6 +144,3 @@ def main(words: list[str]) -> int:
     print(f"{len(seeds)} schedules, {ticks} ticks, {failed} failed; {rate}; {dict(sorted(faults.items()))}")
     return 1 if failed else 0
 
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
