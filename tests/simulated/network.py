@@ -25,12 +25,14 @@ REQUESTS: dict[str, Decoder[Any]] = {
 
 
 class Weather(msgspec.Struct, kw_only=True):
-    """What the network does to messages. Liveliness tokens are late at most."""
+    """What the network does to messages of streams; queries may be lost, and liveliness tokens are late at most."""
 
     latency: float = 0.001
     """Seconds; each message takes between half and one and a half of it. One link keeps the order of its messages."""
     loss: float = 0.0
     """Share of the messages that are lost."""
+    query_loss: float = 0.0
+    """The same of queries and of their answers, which a link loses only when it breaks."""
     double: float = 0.0
     """Share that comes twice."""
     reorder: float = 0.0
@@ -118,13 +120,16 @@ class Network:
         """One message on one link: lost, doubled, overtaken, or in order."""
         weather, draw = self.weather, self._rng.random
         self.counts["sent"] += 1
-        if weather.loss and draw() < weather.loss:
+        stream = kind == "message"
+        if draw() < (weather.loss if stream else weather.query_loss):
             self.counts["lost"] += 1
             return
-        self._deliver_in_order(sender, to, kind, item) if draw() >= weather.reorder else self._deliver_late(
-            to, kind, item
-        )
-        if weather.double and draw() < weather.double:
+        if stream and draw() < weather.reorder:
+            self.counts["reordered"] += 1
+            self._deliver_late(to, kind, item)
+        else:
+            self._deliver_in_order(sender, to, kind, item)
+        if stream and draw() < weather.double:
             self.counts["doubled"] += 1
             self._deliver_late(to, kind, item)
 

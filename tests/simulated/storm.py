@@ -68,7 +68,7 @@ class Storm:
             raise Broken("the state's hash is another than in one process")
         if any(author != driver for author, driver in system.asker.applied):
             raise Broken("a command was applied that was not the driver's")
-        driver = system.names[system.asker.seat.driver]
+        driver = system.names[system.asker.seat.driver or system.asker.applied[-1][0]]
         if load(system.checkpoint(driver))[0].learner_hash != learner_hash:
             raise Broken("what was learned is another than in one process")
         self.counts.update({name: count for name, count in system.network.counts.items() if name != "sent"})
@@ -90,7 +90,8 @@ class Storm:
     def _begin(self, fault: Fault) -> None:
         self.counts[fault.kind] += 1
         if fault.kind == "swap":
-            if not self._agent.dead and self._system.asker.seat.driver == self._agent.ident:
+            agent = self._agent  # one that dies before it hands over takes what it knows with it
+            if not agent.dead and agent.kill_in is None and self._system.asker.seat.driver == agent.ident:
                 self._swap()
             return
         process = self._agent if fault.kind.endswith("agent") else self._sensors
@@ -143,4 +144,3 @@ def main(words: list[str]) -> int:
     rate = f"{ticks / seconds:.0f} ticks/s, {len(seeds) / seconds:.1f} schedules/s"
     print(f"{len(seeds)} schedules, {ticks} ticks, {failed} failed; {rate}; {dict(sorted(faults.items()))}")
     return 1 if failed else 0
-

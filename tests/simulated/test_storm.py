@@ -6,24 +6,19 @@ from simulated.schedule import make
 from simulated.storm import run, shrink
 from simulated.timeline import Timeline
 
-NOT_YET = {
-    37: "a taker-over that dies before it has inherited asks its own former name after its restart",
-    47: "a taker-over whose question for the checkpoint is lost inherits nothing and never asks again",
-}
-"""Seeds of schedules that the agent's machine does not survive yet."""
-
 
 @pytest.mark.parametrize("first", range(0, 60, 20))
 def test_every_schedule_ends_with_the_hashes_of_the_run_in_one_process(first):
-    wrong = {seed: run(make(seed))[0] for seed in range(first, first + 20) if seed not in NOT_YET}
+    wrong = {seed: run(make(seed))[0] for seed in range(first, first + 20)}
     assert not any(wrong.values()), {seed: (why, shrink(make(seed))) for seed, why in wrong.items() if why}
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(s, marks=pytest.mark.xfail(strict=True, reason=w)) for s, w in NOT_YET.items()]
-)
-def test_schedules_that_are_not_survived_yet(seed):
-    assert not run(make(seed))[0]
+@pytest.mark.xfail(strict=True, reason="a taker-over whose question for the checkpoint is lost never asks again")
+def test_a_successor_inherits_although_a_question_is_lost():
+    schedules = [make(seed) for seed in range(12)]
+    for schedule in schedules:
+        schedule.weather.query_loss = 0.3
+    assert not any(run(schedule)[0] for schedule in schedules)
 
 
 def test_a_seed_is_a_schedule():
