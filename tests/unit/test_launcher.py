@@ -43,7 +43,9 @@ class Said(list[str]):
         """A bar is no news."""
 
 
-def test_a_watched_demo_begins_and_ends_slowly():
+def test_a_watched_demo_begins_and_ends_slowly(monkeypatch: pytest.MonkeyPatch):
+    now = [100.0]
+    monkeypatch.setattr(demo.time, "monotonic", lambda: now[0])
     story = demo.Story(UpOptions(epochs=3000), FmuOptions(), stays=True, paced=True)
     wire, said = Wire(), Said()
 
@@ -68,8 +70,16 @@ def test_a_watched_demo_begins_and_ends_slowly():
     assert at(150) == ["resume"]
     assert not due()
     assert at(400, "running") == []
-    assert at(2699, "running") == ["pause"], "the next status would come too late"
-    assert due()
+    now[0] += 0.2
+    assert at(1500, "running") == []
+    now[0] += 0.2
+    assert at(2600, "running") == [], "the pause is due before the next status"
+    assert not due()
+    assert story.wait() == pytest.approx(0.2 * 100 / 1100)
+    now[0] += story.wait()
+    assert not due()
+    assert wire.asked == ["pause", "step"]
+    assert story.wait() == pytest.approx(0.1)
     assert [line[:2] for line in said[1:]] == ["1.", "2.", "3."]
 
 

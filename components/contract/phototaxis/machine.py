@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from msgspec import Struct
 
 from phototaxis.checkpoint import Meta
 from phototaxis.messages import Message
@@ -159,7 +160,11 @@ class Stop(NamedTuple):
     """End the loop once the effects before this one are carried out."""
 
 
-Effect = Publish | Reply | Ask | Listen | Refuse | Say | Warn | Begin | Append | Save | Record | Flush | Stop
+class Own(Struct):
+    """The base of effects that one component's machine has for itself, and its server carries out."""
+
+
+Effect = Publish | Reply | Ask | Listen | Refuse | Say | Warn | Begin | Append | Save | Record | Flush | Stop | Own
 
 
 class Machine(Protocol):

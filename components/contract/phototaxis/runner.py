@@ -38,6 +38,7 @@ class Runner:
     store : where its journal and checkpoint are; None for a component that keeps nothing.
     log : gathers the rows that it wants recorded; None for a component without any.
     clock : seconds of a monotonic clock.
+    own : carries out the effects that this machine has for itself.
     """
 
     def __init__(
@@ -47,9 +48,10 @@ class Runner:
         store: Store | None = None,
         log: Chunks | None = None,
         clock: Callable[[], float] = time.monotonic,
+        own: Callable[[m.Own], object] | None = None,
     ):
         self._bus, self._machine, self._store, self._log = bus, machine, store or Store(), log
-        self._clock, self._running = clock, True
+        self._clock, self.running = clock, True
         self._carry: dict[type[Any], Callable[[Any], object]] = {
             m.Publish: lambda e: bus.put(e.topic, e.message),
             m.Reply: lambda e: e.to(e.message),
@@ -65,6 +67,7 @@ class Runner:
             m.Flush: lambda _: log and log.flush(),
             m.Stop: self._stop,
         }
+        self._own = own
 
     def run(self) -> None:
         """Run until the machine stops.
@@ -75,8 +78,12 @@ class Runner:
             when the last checkpoint cannot be written.
         """
         self.handle(m.START)
-        while self._running:
-            self.handle(self._bus.receive(self._wait()) or m.TIME)
+        while self.running:
+            self.handle(self._bus.receive(self.wait()) or m.TIME)
+        self.finish()
+
+    def finish(self) -> None:
+        """Publish what waits to be recorded, after the machine has stopped; raises as `run` does."""
         if self._log is not None:
             self._log.flush()
         if self._store.fault is not None:
@@ -94,7 +101,10 @@ class Runner:
 
     def carry(self, effect: m.Effect) -> None:
         """Do one thing."""
-        self._carry[type(effect)](effect)
+        if isinstance(effect, m.Own) and self._own is not None:
+            self._own(effect)
+        else:
+            self._carry[type(effect)](effect)
 
     def _write(self, effect: m.Begin | m.Append | m.Save) -> None:
         fault = self._store.carry(effect)
@@ -102,8 +112,9 @@ class Runner:
             self.handle(m.Event("unwritten", fault))
 
     def _stop(self, _: m.Stop) -> None:
-        self._running = False
+        self.running = False
 
-    def _wait(self) -> float:
+    def wait(self) -> float:
+        """Seconds until the loop wants to be called although nothing happens."""
         waiting = math.inf if self._log is None else self._log.deadline
         return min(max(min(self._machine.deadline, waiting) - self._clock(), 0.0), MAX_WAIT_S)

@@ -68,19 +68,22 @@ class Story(Show):
         self._fast_from = min(FIRST, options.epochs)
         self._slow_from = max(options.epochs - LAST, self._fast_from)
         self._paced, self._chapter = paced, 0
-        self._before, self._step_at = (0.0, 0), math.inf
+        self._before, self._step_at, self._pause_at = (0.0, 0), math.inf, math.inf
         self.found: dict[str, Any] | None = None
 
     def wait(self) -> float:
         """Seconds until the next step is due."""
-        return min(max(self._step_at - time.monotonic(), 0.0), super().wait())
+        return min(max(min(self._step_at, self._pause_at) - time.monotonic(), 0.0), super().wait())
 
     def beat(self, bus: Bus) -> None:
-        """Make one step of the paused run where one is due: unlike a clock, it waits for a late answer.
+        """Pause where the last chapter begins; make one step of the paused run where one is due.
 
-        So the learner learns what it learns at full speed.
+        Unlike a clock, a step waits for a late answer, so the learner learns what it learns at full speed.
         """
         now = time.monotonic()
+        if now >= self._pause_at:
+            bus.control(Control("pause"))
+            self._step_at, self._pause_at = time.monotonic(), math.inf
         if now >= self._step_at:
             bus.control(Control("step"))
             self._step_at = max(self._step_at + 1 / TICKS_A_SECOND, now)
@@ -104,10 +107,8 @@ class Story(Show):
         elif self._chapter == 2:
             made = status.epoch - epoch
             if status.epoch + made >= self._slow_from:  # the next status would come too late
-                time.sleep(max(self._slow_from - status.epoch, 0) / max(made, 1) * (now - then))
-                bus.control(Control("pause"))
+                self._pause_at = now + max(self._slow_from - status.epoch, 0) / max(made, 1) * (now - then)
                 self._turn(progress, f"It has learned: watch it turn to the light, until epoch {status.epochs}.")
-                self._step_at = time.monotonic()
 
     def _turn(self, progress: Progress, text: str) -> None:
         self._chapter += 1

@@ -1,6 +1,6 @@
 """Requests to swap the learner: each starts an agent, and is answered when that agent drives, or cannot."""
 
-from phototaxis.bus import Event
+from phototaxis.machine import Event
 from phototaxis.messages import Launch, LaunchReply, Status
 
 from phototaxis_launcher.child import Child

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from importlib.metadata import entry_points
-from typing import Protocol
+from typing import Any, Protocol
 
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError
@@ -12,8 +12,9 @@ from phototaxis.messages import World
 from phototaxis.words import known
 
 from phototaxis_sensors.crowd import CrowdSuite
+from phototaxis_sensors.many import SuiteOfMany
 from phototaxis_sensors.scene import Scene
-from phototaxis_sensors.suite import Models, built_in
+from phototaxis_sensors.suite import Models, SensorSuite, Suite, built_in
 
 GROUP = "phototaxis.sensors"
 """Entry points of packages that provide sensor models."""
@@ -52,6 +53,21 @@ class Provided(Choice, Protocol):
         ...
 
     def close(self) -> None: ...
+
+
+def make_suite(choice: Choice, world: World) -> Suite[Any, Any]:
+    """The suite of a world.
+
+    Raises
+    ------
+    UserError
+        when the models remember and there are many robots, whose episodes begin at different ticks.
+    """
+    if world.robots == 1:
+        return SensorSuite(world, choice)
+    if choice.remembers:
+        raise UserError(f"an FMU senses for one robot; this world has {world.robots}: start it without --robots")
+    return SuiteOfMany(choice.crowd(world, world.robots), world.robots)
 
 
 @contextmanager
