@@ -15,8 +15,7 @@ from phototaxis_agent.setup import make_setup
 from phototaxis_lab import evaluate
 from phototaxis_recorder.recordings import table
 from phototaxis_recorder.summary import RecordingFile, Summary
-from phototaxis_sim.pace import Pace
-from phototaxis_sim.server import Server
+from phototaxis_sim.continued import Continued, open_journal
 from phototaxis_sim.simulation import Simulation
 
 MINE = """
@@ -120,17 +119,11 @@ def test_recordings_of_two_worlds_with_one_name_are_told_apart():
     assert "mine (" not in lines[3]
 
 
-class NoBus:
-    """A bus that nobody is on."""
-
-    ident = "sim"
-
-
 def test_a_run_is_not_continued_in_another_world(paper: Arena, tmp_path: Path):
-    def serve(arena: Arena) -> Server:
-        return Server(NoBus(), Simulation(arena, 0, "r"), Pace(0.5, 0.0), Journal(tmp_path / "journal"))  # pyright: ignore[reportArgumentType]
+    def begin(arena: Arena) -> Continued | None:
+        return open_journal(Journal(tmp_path / "journal"), Simulation(arena, 0, "r"))
 
-    serve(paper)
-    serve(msgspec.structs.replace(paper, name="renamed"))
+    assert begin(paper) is None
+    assert begin(msgspec.structs.replace(paper, name="renamed")) is not None
     with pytest.raises(UserError, match="the run r began in another arena"):
-        serve(msgspec.structs.replace(paper, size=(10.0, 12.0)))
+        begin(msgspec.structs.replace(paper, size=(10.0, 12.0)))

@@ -1,18 +1,24 @@
 """Who drives, who drives next."""
 
+import pytest
+from phototaxis.codec import Refused
 from phototaxis_sim.seat import Seat
 
 
 def test_a_free_seat_is_claimed_and_a_taken_one_is_not():
     seat = Seat()
-    assert seat.claim("a", 0) == ""
-    assert seat.claim("a", 3) == ""
-    assert "taken by a" in seat.claim("b", 4)
+    seat.claim("a", 0)
+    seat.claim("a", 3)
+    with pytest.raises(Refused, match="taken by a"):
+        seat.claim("b", 4)
+    with pytest.raises(Refused, match="b does not hold the seat"):
+        seat.release("b", 4)
     assert seat.driver == "a"
     assert not seat.leave("b", 5)
     assert seat.leave("a", 5)
     assert seat.driver == ""
-    assert seat.claim("", 6)
+    with pytest.raises(Refused, match="names its agent"):
+        seat.claim("", 6)
 
 
 def test_takers_over_sit_down_at_their_tick_in_order():
@@ -35,7 +41,7 @@ def test_standbys_sit_down_when_the_driver_vanishes():
     seat = Seat()
     seat.claim("a", 0)
     for agent in ("b", "c", "b"):
-        assert seat.stand_by(agent, 1) == ""
+        seat.stand_by(agent, 1)
     assert seat.waiting == ["b", "c"]
     seat.leave("b", 2)
     assert seat.leave("a", 3)
@@ -49,9 +55,10 @@ def test_a_standby_takes_a_free_seat_unless_it_is_kept_for_its_former_driver():
     assert seat.driver == "b"
     kept = Seat(heir="a")
     kept.stand_by("b", 0)
-    assert "kept for a" in kept.claim("c", 0)
+    with pytest.raises(Refused, match="kept for a"):
+        kept.claim("c", 0)
     assert kept.driver == ""
-    assert kept.claim("a", 0) == ""
+    kept.claim("a", 0)
     assert kept.leave("a", 1)
     assert kept.driver == "b"
 

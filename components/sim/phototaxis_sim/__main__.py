@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     from phototaxis_sim import arenas
     from phototaxis_sim.many import SimulationOfMany
     from phototaxis_sim.pace import Pace
-    from phototaxis_sim.server import Server
+    from phototaxis_sim.server import serve as serve_simulation
     from phototaxis_sim.simulation import Simulation
 
     arena = arenas.enter(options.arena)
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     def serve(bus: Bus) -> None:
         pace = Pace(arena.motion.control_period, options.speed)
-        Server(bus, simulation, pace, journal, options.patience).serve()
+        serve_simulation(bus, simulation, pace, journal, options.patience)
 
     run("sim", options, serve)
 

@@ -2,12 +2,13 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from phototaxis.arena import Arena
 from phototaxis.codec import Refused
 from phototaxis.columns import COUNT, FLAG, pack, unpack
-from phototaxis.messages import ENDS, CommandOfMany, End, Episode, State, StateOfMany, World
+from phototaxis.messages import ENDS, End, Episode, State, StateOfMany, World
 
 from phototaxis_sim.crowd import Crowd
 from phototaxis_sim.physics import Physics, Pose
@@ -91,7 +92,10 @@ class SimulationOfMany:
         run, number, steps = self.world.run, int(self.episode[0]), self.tick - self._began
         return Episode(run, number, self.tick, steps, end, author, *self._start) if end else None
 
-    def check(self, command: CommandOfMany) -> None:
+    def snapshot(self, recent: list[bool], driver: str) -> None:
+        """Nothing: a run of many robots cannot be continued."""
+
+    def check(self, command: Any) -> None:
         """Raise Refused when a column is not of this many robots, or a command is out of range."""
         self._columns(command.left, command.right, command.end)
 

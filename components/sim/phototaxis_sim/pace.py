@@ -9,12 +9,16 @@ class Pace:
 
     speed 0 is lockstep: a tick ends when its command comes. A speed s > 0 ends a tick every
     control_period / s seconds, with the newest command; times are seconds of a monotonic clock.
+
+    Attributes
+    ----------
+    ends_at : when the present tick ends by the clock.
     """
 
     def __init__(self, period: float, speed: float = 0.0):
         self._period = period
         self.speed = speed
-        self._tick_ends = 0.0
+        self.ends_at = 0.0
         self._commanded = -float("inf")
 
     @property
@@ -24,11 +28,11 @@ class Pace:
     def set(self, speed: float, now: float) -> None:
         """Change the speed from now on."""
         self.speed = speed
-        self._tick_ends = now + self._length()
+        self.ends_at = now + self._length()
 
     def begun(self, now: float) -> None:
         """A tick has begun; a late one does not make the next ones hurry."""
-        self._tick_ends = max(self._tick_ends + self._length(), now)
+        self.ends_at = max(self.ends_at + self._length(), now)
 
     def commanded(self, now: float) -> None:
         """A command for the present tick has come."""
@@ -36,7 +40,7 @@ class Pace:
 
     def wait(self, now: float) -> float:
         """Seconds until the present tick ends by the clock."""
-        return max(self._tick_ends - now, 0.0)
+        return max(self.ends_at - now, 0.0)
 
     def stale(self, now: float) -> bool:
         """Whether the newest command is too old to drive on."""

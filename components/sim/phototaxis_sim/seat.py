@@ -1,5 +1,6 @@
 """The one seat: who may drive, who drives next, and who stands by."""
 
+from phototaxis.codec import Refused
 from phototaxis.messages import How, Seating
 
 KEPT = 50
@@ -33,36 +34,36 @@ class Seat:
         """Who will or would drive next."""
         return [*sorted(self.reserved, key=self.reserved.__getitem__), *self.standbys]
 
-    def claim(self, agent: str, tick: int) -> str:
-        """Sit down if the seat is free or already one's own; a reason when refused, else ""."""
-        if not agent:
-            return "a claim names its agent"
-        if self.driver == agent:
-            return ""
-        if self.driver:
-            return f"the seat is taken by {self.driver}"
-        if self.heir and agent != self.heir:
-            return f"the seat is kept for {self.heir}"
-        self._give(agent, tick, "claimed")
-        return ""
+    def claim(self, agent: str, tick: int) -> None:
+        """Sit down if the seat is free.
 
-    def reserve(self, agent: str, at: int) -> str:
-        """Take the seat over at the first tick boundary from tick `at` on; a reason when refused, else ""."""
-        if not agent:
-            return "a claim names its agent"
+        Raises
+        ------
+        Refused
+            when it is taken, or kept for somebody else.
+        """
+        _named(agent)
+        if self.driver == agent:
+            return
+        if self.driver:
+            raise Refused(f"the seat is taken by {self.driver}")
+        if self.heir and agent != self.heir:
+            raise Refused(f"the seat is kept for {self.heir}")
+        self._give(agent, tick, "claimed")
+
+    def reserve(self, agent: str, at: int) -> None:
+        """Take the seat over at the first tick boundary from tick `at` on."""
+        _named(agent)
         if agent != self.driver:
             self.reserved[agent] = at
-        return ""
 
-    def stand_by(self, agent: str, tick: int) -> str:
-        """Drive when nobody else does; a reason when refused, else ""."""
-        if not agent:
-            return "a claim names its agent"
+    def stand_by(self, agent: str, tick: int) -> None:
+        """Drive when nobody else does."""
+        _named(agent)
         if agent != self.driver and agent not in self.standbys:
             self.standbys.append(agent)
             if not self.driver:
                 self.vacate(tick)
-        return ""
 
     def boundary(self, tick: int) -> bool:
         """Between two ticks: hand over to who has reserved `tick` or an earlier one; whether the driver changed."""
@@ -81,6 +82,17 @@ class Seat:
             return False
         self.vacate(tick)
         return True
+
+    def release(self, agent: str, tick: int) -> None:
+        """Leave the seat on purpose.
+
+        Raises
+        ------
+        Refused
+            when it is somebody else's.
+        """
+        if not self.leave(agent, tick):
+            raise Refused(f"{agent} does not hold the seat")
 
     def next(self, tick: int) -> str:
         """Who would sit down if the seat were vacated now; "" for nobody."""
@@ -103,3 +115,8 @@ class Seat:
             self.standbys.remove(agent)
         self.driver, self.heir = agent, ""
         self.history = [*self.history, Seating(agent, tick, how)][-KEPT:]
+
+
+def _named(agent: str) -> None:
+    if not agent:
+        raise Refused("a claim names its agent")

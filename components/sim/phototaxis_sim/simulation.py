@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Struct
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError
-from phototaxis.messages import Command, End, Episode, State, World
+from phototaxis.messages import Command, CommandOfMany, End, Episode, State, World
 
 from phototaxis_sim.physics import Motion, Physics, Pose
 
@@ -77,8 +77,8 @@ class Simulation:
         """Whether the light was reached, for each episode that ended in the last `advance`."""
         return [] if self.ended is None else [self.ended.end == "reached"]
 
-    def check(self, command: Command) -> None:
-        """Nothing is wrong with a command that has been decoded."""
+    def check(self, command: Command | CommandOfMany) -> None:
+        """No-op: decoding has validated the command of one robot."""
 
     @property
     def watched(self) -> State:
