@@ -146,7 +146,7 @@ def test_a_component_alone_says_what_becomes_of_it(start, world):
         wait_status(bus, lambda _: line in third.stderr, sim, sensors, driver, third)
     assert f"senses in the run {status.run}" in sensors.stderr
     assert f"sim of the world '{world}', on this machine; waits for sensors and an agent" in sim.stderr
-    assert f"sim: driver drives in the run {status.run}, from tick 0 on" in sim.stderr
+    assert f": driver drives in the run {status.run}, from tick 0 on" in sim.stderr
 
 
 def test_a_frozen_driver_loses_the_seat_and_its_late_command_does_not_count(team, tmp_path):

@@ -44,7 +44,7 @@ TABLE = {
     **{(phase, given): phase for phase in _STANDING for given in (Given.SEATED, Given.VACATED)},
     **{(phase, Given.PAUSE): Phase.PAUSED for phase in _GOING},
     **{(phase, Given.RESUME): phase for phase in (*_RUNNING, Phase.FINISHED)},
-    (Phase.FINISHED, Given.PAUSE): Phase.FINISHED,
+    (Phase.ENDING, Given.PAUSE): Phase.ENDING,
     (Phase.PAUSED, Given.RESUME): Phase.WAITING,
     **{(phase, Given.LAST): Phase.FINISHED for phase in (Phase.ASKING, Phase.PAUSED, Phase.ENDING)},
     **{(phase, Given.BEGIN): phase for phase in _GOING},

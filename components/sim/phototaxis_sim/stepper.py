@@ -62,7 +62,7 @@ class Stepper:
         }
         self._verbs: dict[str, Callable[[Control], object]] = {
             "status": lambda _: None,
-            "pause": lambda _: self._pause(),
+            "pause": lambda _: self._stand(Given.PAUSE),
             "resume": self._resume,
             "step": self._step,
             "speed": lambda asked: self._pace_set(asked.speed),
@@ -79,6 +79,8 @@ class Stepper:
     def deadline(self) -> float:
         """When the next status, repeat, tick of the clock or end of patience is due."""
         steps = self.steps
+        if steps.state is Phase.ENDED:
+            return math.inf
         at = min(steps.report.due_at, self._stop_by, self._heir_until)
         if steps.state is not Phase.FINISHED:
             at = min(at, steps.question.repeat_at)
@@ -91,11 +93,11 @@ class Stepper:
         steps = self.steps
         steps.now, steps.out = now, [] if event.topic != "start" else steps.out
         handle = self._on.get(event.topic)
-        if handle is not None:
+        if handle is not None and steps.state is not Phase.ENDED:
             handle(event)
         if now >= self.deadline:
             self._by_the_clock()
-        if now >= self._stop_by or (self._stop_by < math.inf and not steps.unanswered):
+        if self._stop_by < math.inf and (now >= self._stop_by or not steps.unanswered):
             self._end()
         return steps.out
 
@@ -173,11 +175,11 @@ class Stepper:
         if not seat.driver:
             seat.boundary(tick)
 
-    def _pause(self) -> None:
+    def _stand(self, given: Given) -> None:
         """Apply no more commands; the present tick is still answered, and is then the last that is recorded."""
         steps = self.steps
-        if steps.state is not Phase.ENDING:
-            steps.phase.take(Given.PAUSE)
+        if steps.state is not Phase.FINISHED:
+            steps.phase.take(given)
         steps.steps_due = 0
         if steps.held is not None:
             steps.record(steps.simulation.watched)
@@ -211,9 +213,7 @@ class Stepper:
 
     def _stop(self, _: Control) -> None:
         """Wait for the answer to the present tick, but not for long, and end."""
-        self._pause()
-        if self.steps.state is not Phase.FINISHED:
-            self.steps.phase.take(Given.STOP)
+        self._stand(Given.STOP)
         self._stop_by = min(self._stop_by, self.steps.now + ANSWERED_WITHIN_S)
 
     def _refuse_ending(self) -> None:
