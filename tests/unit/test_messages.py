@@ -14,7 +14,7 @@ def packed(**changes) -> bytes:
 
 
 def test_messagepack_and_json_give_the_same_message():
-    command = Command("r", 3, "a", 0.5, -1.0)
+    command = Command(run="r", tick=3, author="a", left=0.5, right=-1.0)
     assert decode(encode(command)) == command
     assert decode(msgspec.json.encode(command)) == command
     assert decode(msgspec.json.encode(GOOD)) == command
@@ -47,18 +47,39 @@ def test_what_is_not_a_command_is_refused(payload, reason):
 @pytest.mark.parametrize("seed", [-1, 2**53 + 1])
 def test_a_seed_that_cannot_be_one_is_refused_at_the_door(seed):
     with pytest.raises(Refused, match="seed"):
-        Decoder(Control, 1000)(encode(Control("begin", seed=seed)))
+        Decoder(Control, 1000)(encode(Control(verb="begin", seed=seed)))
 
 
 def test_a_log_whose_columns_do_not_fit_its_ticks_is_refused():
     good = msgspec.to_builtins(
-        AgentLog("r", 0, "w", "mine", "camera", [0, 1], [0, 0], [4, 4], [0.0] * 2, [0.0] * 2, [1.0] * 2)
+        AgentLog(
+            run="r",
+            seq=0,
+            writer="w",
+            learner="mine",
+            percept="camera",
+            tick=[0, 1],
+            state=[0, 0],
+            action=[4, 4],
+            reward=[0.0] * 2,
+            td_error=[0.0] * 2,
+            temperature=[1.0] * 2,
+        )
     )
     assert Decoder(AgentLog, 10_000)(msgspec.msgpack.encode(good)).percept == "camera"
     for change in ({"reward": [0.0]}, {"tick": [], "state": []}, {"tick": [-1, 0]}, {"tick": [0, 2**63]}):
         with pytest.raises(Refused, match="invalid"):
             Decoder(AgentLog, 10_000)(msgspec.msgpack.encode({**good, **change}))
-    readings = SensorsLog("r", 0, "w", "built-in", "built-in", [0], [1.0] * 16, [0.5] * 2)
+    readings = SensorsLog(
+        run="r",
+        seq=0,
+        writer="w",
+        sonar_model="built-in",
+        light_model="built-in",
+        tick=[0],
+        sonar=[1.0] * 16,
+        light=[0.5] * 2,
+    )
     broken = {**msgspec.to_builtins(readings), "sonar": [1.0] * 15}
     with pytest.raises(Refused, match="sonar has 15 values for 1 ticks"):
         Decoder(SensorsLog, 10_000)(msgspec.msgpack.encode(broken))

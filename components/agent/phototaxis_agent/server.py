@@ -113,7 +113,7 @@ class Server:
                 pass
             self._log.flush()
             if self._session is not None:
-                self._bus.control(Control("release", self._bus.ident), timeout=0.5)
+                self._bus.control(Control(verb="release", agent=self._bus.ident), timeout=0.5)
                 if fault := self._save(self._session.agent, last=True):
                     raise fault
 
@@ -160,13 +160,13 @@ class Server:
         if self._mode == "claim":
             if not readings.driver:
                 self._claim_at = now + CLAIM_EVERY
-                self._bus.control(Control("claim", self._bus.ident))
+                self._bus.control(Control(verb="claim", agent=self._bus.ident))
             elif not self._enlisted:
                 self._enlisted = True
                 self._say(f"waits until {readings.driver} leaves the seat; --take-over takes it, --standby inherits it")
         elif not self._enlisted:
             self._claim_at = now + CLAIM_EVERY
-            reply = self._bus.control(Control(self._mode, self._bus.ident, at=self._at))
+            reply = self._bus.control(Control(verb=self._mode, agent=self._bus.ident, at=self._at))
             self._enlisted = reply is not None and reply.ok
             if self._enlisted:
                 waits = "stands by" if self._mode == "stand by" else f"takes over from tick {self._at} on"
@@ -198,7 +198,7 @@ class Server:
     def _inherit(self, session: Session, probe: bool = False) -> bool:
         """Become what the leader is; whether it could. `probe`: only find out whether it would fit."""
         agent = session.agent
-        request = CheckpointRequest(self._leader, agent.name, agent.task.percept, probe)
+        request = CheckpointRequest(agent=self._leader, learner=agent.name, percept=agent.task.percept, probe=probe)
         reply: CheckpointReply | None = self._bus.ask_agent(self._leader, "checkpoint", request, INHERIT_WITHIN)
         if reply is None or reply.reason or probe:
             if not probe:
@@ -359,8 +359,8 @@ class Server:
         agents, tick, state, action, reward, error, temperature = columns
         agent: Agent = agents[0]
         log = AgentLog(
-            agent.tick[0], seq, self._bus.ident, agent.name, agent.task.percept,
-            tick, state, action, reward, error, temperature,
+            run=agent.tick[0], seq=seq, writer=self._bus.ident, learner=agent.name, percept=agent.task.percept,
+            tick=tick, state=state, action=action, reward=reward, td_error=error, temperature=temperature,
         )  # fmt: skip
         now = time.monotonic()
         if now >= self._table_at:

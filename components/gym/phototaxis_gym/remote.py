@@ -86,7 +86,7 @@ class Link:
         """The first readings of a run with this seed; whoever drives is asked to hand over first."""
         self._check_open()
         self._sit()
-        reply = self._bus.control(Control("begin", self.ident, seed=seed), timeout=self._timeout)
+        reply = self._bus.control(Control(verb="begin", agent=self.ident, seed=seed), timeout=self._timeout)
         if reply is None or not reply.ok:
             raise Error(f"{self._where} does not begin anew: {reply.reason if reply else 'no answer'}")
         self._now = None
@@ -115,7 +115,7 @@ class Link:
     def close(self) -> None:
         """Leave the seat and the bus."""
         if self._closing.alive:
-            self._bus.control(Control("release", self.ident), timeout=0.5)
+            self._bus.control(Control(verb="release", agent=self.ident), timeout=0.5)
             self._closing()
 
     def __reduce__(self) -> Any:
@@ -138,7 +138,7 @@ class Link:
     def _sit(self) -> None:
         """Take the seat, if it is not ours. A finished run sends no readings that could show whose it is."""
         self._sought_at = time.monotonic()
-        reply = self._bus.control(Control("take over", self.ident), timeout=self._timeout)
+        reply = self._bus.control(Control(verb="take over", agent=self.ident), timeout=self._timeout)
         if reply is not None and reply.status.driver == self.ident:
             return
         self._hear(lambda readings: readings.driver == self.ident, lambda _: self._seek("take over"), seated=False)
@@ -147,7 +147,7 @@ class Link:
         """Ask for the seat, now and then."""
         if time.monotonic() >= self._sought_at:
             self._sought_at = time.monotonic() + SEEK_EVERY
-            self._bus.control(Control(verb, self.ident))
+            self._bus.control(Control(verb=verb, agent=self.ident))
 
     def _hear(
         self,
@@ -185,7 +185,7 @@ class Link:
         """Why no readings come, as far as the simulation can tell."""
         if missing := [role for role in ("sim", "sensors") if role not in self._present]:
             return f"{' and '.join(missing)} not there"
-        reply = self._bus.control(Control("status"))
+        reply = self._bus.control(Control(verb="status"))
         if reply is None:
             return "the simulation is there, but does not answer"
         status = reply.status
@@ -235,11 +235,15 @@ class There:
         return self._link.begin(seed)
 
     def drive(self, left: float, right: float) -> Readings:
-        return self._link.answer(lambda run, tick: Command(run, tick, self._link.ident, left, right))
+        return self._link.answer(
+            lambda run, tick: Command(run=run, tick=tick, author=self._link.ident, left=left, right=right)
+        )
 
     def place(self, end: End, start: Pose | None = None) -> Readings:
         _refuse_poses(start)
-        return self._link.answer(lambda run, tick: Command(run, tick, self._link.ident, 0.0, 0.0, end))
+        return self._link.answer(
+            lambda run, tick: Command(run=run, tick=tick, author=self._link.ident, left=0.0, right=0.0, end=end)
+        )
 
     def close(self) -> None:
         """Leave the seat and the bus."""
@@ -271,8 +275,14 @@ class ManyThere:
         return self._senses(self._link.begin(seeds[0]))
 
     def drive(self, motors: np.ndarray, ends: np.ndarray) -> CrowdReadings:
-        columns = pack(motors[0]), pack(motors[1]), pack(ends, FLAG)
-        return self._senses(self._link.answer(lambda run, tick: CommandOfMany(run, tick, self._link.ident, *columns)))
+        left, right, end = pack(motors[0]), pack(motors[1]), pack(ends, FLAG)
+        return self._senses(
+            self._link.answer(
+                lambda run, tick: CommandOfMany(
+                    run=run, tick=tick, author=self._link.ident, left=left, right=right, end=end
+                )
+            )
+        )
 
     def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> CrowdReadings:
         """One tick, in which the others hold still."""

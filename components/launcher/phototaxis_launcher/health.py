@@ -35,7 +35,7 @@ def main(argv: Sequence[str]) -> int:
                     continue
                 if options.id and f"-{options.id}-" not in event.message[1]:
                     continue
-                if options.role != "sim" or bus.control(Control("status")) is not None:
+                if options.role != "sim" or bus.control(Control(verb="status")) is not None:
                     return 0
     who = f"{options.role} {options.id}".rstrip()
     raise Unavailable(f"no {who} answers on the bus of '{options.name}'")

@@ -16,7 +16,7 @@ from phototaxis.bus import Bus, Event
 from phototaxis.checkpoint import load
 from phototaxis.errors import INTERRUPTED, ComponentFailed, Unavailable, UserError, warn
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import MOST, Control, Count, Launch, LaunchReply, Seed, Status
+from phototaxis.messages import MAX_ROBOTS, Control, Count, Launch, LaunchReply, Seed, Status
 from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.ports import find_ports
 from phototaxis.session import BusOptions, open_session
@@ -55,7 +55,7 @@ class UpOptions(BusOptions, kw_only=True):
     """learning steps; 0: run until stopped"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """simulated seconds per second; 0: lockstep, as fast as it goes"""
-    robots: Annotated[int, Meta(ge=1, le=MOST)] = 1
+    robots: Annotated[int, Meta(ge=1, le=MAX_ROBOTS)] = 1
     """so many robots at once, each alone in its arena; one learner drives them all, the first is recorded"""
     swap: str = ""
     """TICK:LEARNER,…: at these ticks fresh agents take over; they inherit from one of their kind, and learn in the
@@ -138,7 +138,7 @@ class Run:
         stopped is paused first: status, checkpoints and recording then end with the same tick.
         """
         show = show or Show()
-        status = Status(self.name, "waiting")
+        status = Status(run=self.name, phase="waiting")
         with (
             self._folder_of_a_run(),
             open_session("launcher", self._options) as session,
@@ -227,7 +227,7 @@ class Run:
                     del self.children["recorder"]
                     warn(f"{error}; the run goes on without it")
                     continue
-                if not self._answer(child, LaunchReply(str(error))):
+                if not self._answer(child, LaunchReply(reason=str(error))):
                     raise
                 progress.say(str(error))
                 self.agents.remove(child)
@@ -387,13 +387,13 @@ class Run:
 
 def _paused(bus: Bus, status: Status) -> Status:
     """The status of a run that is paused for its end, when the driver has answered its last tick."""
-    reply, deadline = bus.control(Control("pause"), ANSWERED_WITHIN), time.monotonic() + ANSWERED_WITHIN
+    reply, deadline = bus.control(Control(verb="pause"), ANSWERED_WITHIN), time.monotonic() + ANSWERED_WITHIN
     while reply is not None:
         status = reply.status  # asked for: those in the inbox may be older than the pause
         if status.phase != "paused" or not status.waiting_for or time.monotonic() > deadline:
             break
         bus.receive(timeout=0.05)
-        reply = bus.control(Control("status"), ANSWERED_WITHIN)
+        reply = bus.control(Control(verb="status"), ANSWERED_WITHIN)
     return status
 
 

@@ -74,7 +74,9 @@ class Server:
                 recording.keep()
                 flush_at = now + FLUSH_EVERY
             if recording is not None and now >= catch_up_at:
-                self._bus.put("recording", Recorded(self._run, recording.kept, recording.fault or recording.low))
+                self._bus.put(
+                    "recording", Recorded(run=self._run, tick=recording.kept, warning=recording.fault or recording.low)
+                )
                 behind = recording.translator.behind()
                 for topic in LOGS:
                     if topic.removeprefix("log/") in behind or now - self._heard.get(topic, 0.0) > CATCH_UP_EVERY:
@@ -130,7 +132,7 @@ class Server:
         writer = self._writer.get(topic, "")
         if writer and writer not in self._alive:
             return
-        for payload in self._bus.ask(topic, LogRequest(self._expected.get((topic, writer), 0), writer)):
+        for payload in self._bus.ask(topic, LogRequest(seq=self._expected.get((topic, writer), 0), writer=writer)):
             try:
                 self._write(topic, self._decoders[topic](payload))
             except Refused as why:

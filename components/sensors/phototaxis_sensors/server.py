@@ -139,4 +139,13 @@ class Server:
     def _chunk(self, seq: int, columns: list[Any]) -> SensorsLog:
         runs, ticks, sonars, lights = columns
         sonar, light = list(chain.from_iterable(sonars)), list(chain.from_iterable(lights))
-        return SensorsLog(runs[0], seq, self._bus.ident, self._models[0], self._models[1], ticks, sonar, light)
+        return SensorsLog(
+            run=runs[0],
+            seq=seq,
+            writer=self._bus.ident,
+            sonar_model=self._models[0],
+            light_model=self._models[1],
+            tick=ticks,
+            sonar=sonar,
+            light=light,
+        )

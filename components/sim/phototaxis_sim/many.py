@@ -42,7 +42,7 @@ class SimulationOfMany:
         seeds: Sequence[int] | None = None,
         starts: Mapping[int, Pose] | None = None,
     ):
-        self.world = World(run, arena, seed, epochs, robots)
+        self.world = World(run=run, arena=arena, seed=seed, epochs=epochs, robots=robots)
         self._seeds = [seed + row for row in range(robots)] if seeds is None else list(seeds)
         self._given = dict(starts or {})
         self._physics = Physics(arena)
@@ -88,8 +88,13 @@ class SimulationOfMany:
 
     def _ending(self, end: End, author: str) -> Episode | None:
         """The first robot's episode, if it ends now."""
-        run, number, steps = self.world.run, int(self.episode[0]), self.tick - self._began
-        return Episode(run, number, self.tick, steps, end, author, *self._start) if end else None
+        if not end:
+            return None
+        x, y, heading = self._start
+        return Episode(
+            run=self.world.run, episode=int(self.episode[0]), tick=self.tick, steps=self.tick - self._began,
+            end=end, driver=author, x=x, y=y, heading=heading,
+        )  # fmt: skip
 
     def check(self, command: CommandOfMany) -> None:
         """Raise Refused when a column is not of this many robots, or a command is out of range."""
@@ -136,9 +141,10 @@ class SimulationOfMany:
         """The first robot, for people to watch."""
         state, (x, y, heading) = self.state, self.poses[0].tolist()
         return State(
-            state.run, state.tick, int(self.episode[0]), state.epoch, state.time, x, y, heading, 0.0, 0.0,
-            bool(self.front[0]), bool(self.rear[0]), float(self._motors[0][0]), float(self._motors[1][0]),
-            state.author, state.driver, state.hash,
+            run=state.run, tick=state.tick, episode=int(self.episode[0]), epoch=state.epoch, time=state.time, x=x, y=y,
+            heading=heading, speed=0.0, turn=0.0, front=bool(self.front[0]), rear=bool(self.rear[0]),
+            left=float(self._motors[0][0]), right=float(self._motors[1][0]), author=state.author, driver=state.driver,
+            hash=state.hash,
         )  # fmt: skip
 
     def _column(self, given: bytes | float) -> np.ndarray:
@@ -158,16 +164,26 @@ class SimulationOfMany:
 
     def _report(self, author: str) -> StateOfMany:
         left, right = self._motors
-        columns = (
-            pack(self.episode, COUNT), pack(self.poses.T), pack(np.stack([self.front, self.rear]), FLAG),
-            pack(left), pack(right),
-        )  # fmt: skip
+        columns = {
+            "episode": pack(self.episode, COUNT),
+            "pose": pack(self.poses.T),
+            "contact": pack(np.stack([self.front, self.rear]), FLAG),
+            "left": pack(left),
+            "right": pack(right),
+        }
         digest = hashlib.blake2b(self._chain, digest_size=8)
-        for column in (pack(np.array([self.tick, self.epoch]), COUNT), *columns):
+        for column in (pack(np.array([self.tick, self.epoch]), COUNT), *columns.values()):
             digest.update(column)
         self._chain = digest.digest()
         seconds = self.tick * self.world.arena.motion.control_period
         self.state = StateOfMany(
-            self.world.run, self.tick, self.epoch, seconds, *columns, author, "", digest.hexdigest()
+            run=self.world.run,
+            tick=self.tick,
+            epoch=self.epoch,
+            time=seconds,
+            **columns,
+            author=author,
+            driver="",
+            hash=digest.hexdigest(),
         )
         return self.state

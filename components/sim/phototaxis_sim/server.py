@@ -250,7 +250,7 @@ class Server:
         request: Control | None = event.message
         reason = "an empty request" if request is None else self._obey(request)
         if event.reply:
-            event.reply(ControlReply(not reason, reason, self._status(time.monotonic())))
+            event.reply(ControlReply(ok=not reason, reason=reason, status=self._status(time.monotonic())))
 
     def _obey(self, request: Control) -> str:
         """Do what is asked; a reason when it is refused, else ""."""
@@ -399,8 +399,9 @@ class Server:
         ended, self._ended = self._ended, []
         tick, episode, seconds, x, y, heading, left, right, contact = columns
         return SimLog(
-            self._sim.world.run, seq, self._bus.ident, self._logged,
-            tick, episode, seconds, x, y, heading, left, right, contact, ended, self._lateness.ticks,
+            run=self._sim.world.run, seq=seq, writer=self._bus.ident, driver=self._logged, tick=tick, episode=episode,
+            time=seconds, x=x, y=y, heading=heading, left=left, right=right, contact=contact, ended=ended,
+            late=self._lateness.ticks,
         )  # fmt: skip
 
     def _header(self) -> bytes:
