@@ -6,8 +6,9 @@ BIN := $(VENV)/bin
 # The index of PyTorch's CPU builds; empty: the ordinary index alone (it may bring gigabytes of CUDA).
 TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 TEST ?= tests
+SEEDS ?= 0:1000
 
-.PHONY: help setup demo test check bench picture clean
+.PHONY: help setup demo test check bench storm picture clean
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' Makefile | column -t -s '|'
@@ -35,6 +36,9 @@ check: setup ## style, types
 
 bench: setup ## measure rates and costs on this machine
 	@$(BIN)/python benchmarks/run.py
+
+storm: setup ## schedules of faults on a simulated network, SEEDS=FIRST:LAST; one seed is shrunk where it fails
+	@PYTHONPATH=tests $(BIN)/python -m simulated $(SEEDS)
 
 picture: setup ## the README's picture and animation, from a real run
 	@scripts/picture

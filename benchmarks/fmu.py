@@ -9,11 +9,11 @@ from pathlib import Path
 from phototaxis.arena import Arena
 from phototaxis.fmu import FmuOptions
 from phototaxis_agent.setup import make_setup
+from phototaxis_fmu.build import build
+from phototaxis_fmu.examples import EXAMPLES
 from phototaxis_lab.loop import train
 from phototaxis_lab.measure import evaluate
 from phototaxis_sensors.choice import choose
-from phototaxis_sensors.fmu.build import build
-from phototaxis_sensors.fmu.examples import EXAMPLES
 from phototaxis_sensors.model import Past
 from phototaxis_sensors.scene import Scene
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import fmpy
 import psutil
 import pytest
-from phototaxis_sensors.fmu.build import Version, build
-from phototaxis_sensors.fmu.examples import EXAMPLES, Example, Variable
+from phototaxis_fmu.build import Version, build
+from phototaxis_fmu.examples import EXAMPLES, Example, Variable
 
 FAULTY = Example(
     "faulty",
@@ -83,7 +83,7 @@ def workers() -> list[int]:
         words = process.info["cmdline"] or []
         environ = process.info["environ"] or {}
         ours = environ.get("XDG_RUNTIME_DIR") == os.environ.get("XDG_RUNTIME_DIR")
-        if "phototaxis_sensors.fmu.worker" in words and ours:
+        if "phototaxis_fmu.worker" in words and ours:
             left.append(process.pid)
     return left
 

@@ -4,7 +4,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-from phototaxis.viewer import rerun_program
+from phototaxis_recorder.viewer import rerun_program
 from rerun.chunk import RrdReader
 
 RERUN = str(rerun_program())

@@ -11,10 +11,10 @@ from engine import DEADLINE, System, docker
 from fmus import Built
 from phototaxis.errors import Unavailable
 from phototaxis.messages import LogRequest, Status
+from phototaxis.roles import COMPONENTS
 from rerun_files import RERUN, newest_tick
 
-ROLES = {"sim", "sensors", "agent", "recorder"}
-SERVICES = ("router", *sorted(ROLES))
+SERVICES = ("router", *COMPONENTS)
 
 
 def test_it_comes_up_healthy_and_ticks(system: System, capsys: pytest.CaptureFixture[str]):
@@ -91,7 +91,7 @@ def test_what_is_killed_comes_back_and_the_run_goes_on(system: System, service: 
 
 def complete(status: Status) -> bool:
     """The run goes on with all its components."""
-    return status.phase == "running" and {who.split("/")[0] for who in status.alive} >= ROLES
+    return status.phase == "running" and {who.split("/")[0] for who in status.alive} >= COMPONENTS.keys()
 
 
 def test_another_learner_takes_the_seat(system: System):

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-from phototaxis.bus import Bus, Event
+from phototaxis.bus import Bus
+from phototaxis.machine import Event
 from phototaxis.messages import Status
 from phototaxis.session import BusOptions, open_session
 

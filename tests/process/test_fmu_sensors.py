@@ -11,8 +11,8 @@ from pathlib import Path
 import psutil
 import pytest
 from fmus import FAULTS, Built, altered, described, edited, workers
-from phototaxis_sensors.fmu.build import build
-from phototaxis_sensors.fmu.examples import EXAMPLES
+from phototaxis_fmu.build import build
+from phototaxis_fmu.examples import EXAMPLES
 from rerun_files import series
 from support import children, observer, phototaxis, result, wait_alive, wait_status
 
@@ -280,7 +280,7 @@ def test_without_fmpy_it_says_what_to_install(fmu: Built):
     words = [sys.executable, "-c", program, "sensors", "--light-fmu", str(fmu("lag", 3))]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr.strip().endswith("pip install 'phototaxis[sensors,fmu]'")
+    assert done.stderr.strip().endswith("pip install 'phototaxis[fmu]'")
 
 
 def test_an_fmu_in_python(tmp_path):

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from phototaxis.errors import Unavailable
 from phototaxis.journal import GIVEN_UP, Journal
-from phototaxis_launcher.processes import Child
+from phototaxis_launcher.child import Child
 from phototaxis_sim import arenas
 from phototaxis_sim.simulation import Simulation
 from rerun_files import newest_tick

@@ -104,7 +104,7 @@ def test_another_run_is_another_recording(start, world, tmp_path):
         sim = start("sim", *place, "--run", run, "--epochs", 300)
         with observer(world) as bus:
             end = wait_status(bus, lambda status, run=run: status.run == run and status.phase == "finished", sim)
-            wait_for_recorder(bus, tmp_path / f"{run}.json", end.tick)
+            wait_for_recorder(bus, tmp_path / f"{run}.json", end.tick)  # it asks the others for the rest, but not sim
         ends[run] = end.tick
         assert sim.stop() == 0
     assert recorder.stop() == 0

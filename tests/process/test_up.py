@@ -171,7 +171,7 @@ def test_a_learner_goes_on_from_a_checkpoint_in_another_run(up, tmp_path):
 
 def test_a_component_that_keeps_dying_is_given_up_with_its_last_words(tmp_path, monkeypatch):
     from phototaxis.errors import ComponentFailed
-    from phototaxis_launcher.processes import Child
+    from phototaxis_launcher.child import Child
 
     (tmp_path / "broken.py").write_text("import sys; sys.exit('the wheel came off')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))

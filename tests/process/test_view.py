@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from phototaxis.errors import ComponentFailed, Unavailable, UserError
 from phototaxis.ports import free_ports
-from phototaxis_launcher import view
-from phototaxis_launcher.headless import picture, shown_tick, viewer
+from phototaxis_recorder import view
+from phototaxis_recorder.headless import picture, shown_tick, viewer
 from PIL import Image
 from rerun_files import RERUN
 from support import DEADLINE, children, observer, phototaxis, wait_status

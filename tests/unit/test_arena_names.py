@@ -11,10 +11,10 @@ from phototaxis.arena import Arena
 from phototaxis.errors import UserError
 from phototaxis.journal import Journal
 from phototaxis.messages import World
-from phototaxis.recordings import Recording, Summary
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab import evaluate
-from phototaxis_launcher.recordings import table
+from phototaxis_recorder.recordings import table
+from phototaxis_recorder.summary import RecordingFile, Summary
 from phototaxis_sim.pace import Pace
 from phototaxis_sim.server import Server
 from phototaxis_sim.simulation import Simulation
@@ -113,7 +113,7 @@ def test_an_agent_that_meets_another_world_goes_on_there(paper: Arena):
 
 def test_recordings_of_two_worlds_with_one_name_are_told_apart():
     summaries = [Summary("a", "paper", "12345678"), Summary("b", "paper", "abcdefgh"), Summary("c", "mine", "1")]
-    lines = table([Recording(Path(one.run), 1, 0.0, one) for one in summaries])
+    lines = table([RecordingFile(Path(one.run), 1, 0.0, one) for one in summaries])
     assert "paper (1234)" in lines[1]
     assert "paper (abcd)" in lines[2]
     assert "mine " in lines[3]

@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 from phototaxis import options
 from phototaxis_lab import train
-from phototaxis_launcher import cli, swap, up
+from phototaxis_launcher import cli, swap
+from phototaxis_launcher.options import parse
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -100,7 +101,7 @@ def test_every_command_line_that_is_shown_is_understood(reading: None, words: li
 
 def test_what_is_shown_is_found():
     assert len(commands()) > 40
-    assert up.parse(["--learner", "mirror"])[2] == ["--learner", "mirror"]
+    assert parse(["--learner", "mirror"])[2] == ["--learner", "mirror"]
 
 
 def test_every_verb_of_make_that_is_shown_exists():

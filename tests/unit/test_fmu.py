@@ -14,10 +14,10 @@ from phototaxis.arena import Arena, Light
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
+from phototaxis_fmu.description import read
+from phototaxis_fmu.sensors import FmuSensors
+from phototaxis_fmu.wiring import SUITES, connect
 from phototaxis_sensors.crowd import CrowdSuite
-from phototaxis_sensors.fmu.description import read
-from phototaxis_sensors.fmu.sensors import FmuSensors
-from phototaxis_sensors.fmu.wiring import SUITES, connect
 from phototaxis_sensors.model import Past
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.suite import SensorSuite, built_in

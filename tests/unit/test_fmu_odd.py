@@ -15,15 +15,15 @@ from phototaxis.arena import Arena
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
-from phototaxis_sensors.fmu.build import Version, build
-from phototaxis_sensors.fmu.description import read
-from phototaxis_sensors.fmu.examples import EXAMPLES
-from phototaxis_sensors.fmu.host import Host
-from phototaxis_sensors.fmu.log import LONGEST, SHOWN, one_line
-from phototaxis_sensors.fmu.pace import pace
-from phototaxis_sensors.fmu.sensors import FmuSensors
-from phototaxis_sensors.fmu.start import start_value
-from phototaxis_sensors.fmu.wiring import SUITES, connect
+from phototaxis_fmu.build import Version, build
+from phototaxis_fmu.description import read
+from phototaxis_fmu.examples import EXAMPLES
+from phototaxis_fmu.host import Host
+from phototaxis_fmu.log import LONGEST, SHOWN, one_line
+from phototaxis_fmu.pace import pace
+from phototaxis_fmu.sensors import FmuSensors
+from phototaxis_fmu.start import start_value
+from phototaxis_fmu.wiring import SUITES, connect
 from phototaxis_sensors.model import Past
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.suite import built_in

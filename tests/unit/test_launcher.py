@@ -10,13 +10,18 @@ from phototaxis.errors import Unavailable, UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Control, Status, World
 from phototaxis.ports import find_ports, free_ports
-from phototaxis.recordings import Recording, Summary
 from phototaxis_agent.setup import make_setup
-from phototaxis_launcher import demo, swap, up
+from phototaxis_launcher import demo, swap
+from phototaxis_launcher.child import Child
 from phototaxis_launcher.cli import extra_with
+from phototaxis_launcher.folder import RunFolder
+from phototaxis_launcher.news import News
+from phototaxis_launcher.options import UpOptions, parse
 from phototaxis_launcher.places import places
+from phototaxis_launcher.processes import Processes
 from phototaxis_launcher.progress import success
-from phototaxis_launcher.recordings import table
+from phototaxis_recorder.recordings import table
+from phototaxis_recorder.summary import RecordingFile, Summary
 from phototaxis_sim import arenas
 
 
@@ -34,9 +39,14 @@ class Said(list[str]):
     def say(self, text: str) -> None:
         self.append(text)
 
+    def show(self, status: Status) -> None:
+        """A bar is no news."""
 
-def test_a_watched_demo_begins_and_ends_slowly():
-    story = demo.Story(up.UpOptions(epochs=3000), FmuOptions(), stays=True, paced=True)
+
+def test_a_watched_demo_begins_and_ends_slowly(monkeypatch: pytest.MonkeyPatch):
+    now = [100.0]
+    monkeypatch.setattr(demo.time, "monotonic", lambda: now[0])
+    story = demo.Story(UpOptions(epochs=3000), FmuOptions(), stays=True, paced=True)
     wire, said = Wire(), Said()
 
     def at(epoch: int, phase: str = "paused", driver: str = "qtable-1", waiting_for: str = "") -> list[str]:
@@ -62,17 +72,24 @@ def test_a_watched_demo_begins_and_ends_slowly():
     assert at(150) == ["resume"]
     assert not due()
     assert at(400, "running") == []
-    assert at(2699, "running") == ["pause"], "the next status would come too late"
-    assert due()
+    now[0] += 0.2
+    assert at(1500, "running") == []
+    now[0] += 0.2
+    assert at(2600, "running") == [], "the pause is due before the next status"
+    assert not due()
+    assert story.wait() == pytest.approx(0.2 * 100 / 1100)
+    now[0] += story.wait()
+    assert not due()
+    assert wire.asked == ["pause", "step"]
+    assert story.wait() == pytest.approx(0.1)
     assert [line[:2] for line in said[1:]] == ["1.", "2.", "3."]
 
 
 def test_a_demo_that_nobody_watches_is_left_alone():
-    story = demo.Story(up.UpOptions(epochs=3000), FmuOptions(), stays=False, paced=False)
+    story = demo.Story(UpOptions(epochs=3000), FmuOptions(), stays=False, paced=False)
     wire, said = Wire(), Said()
     for epoch in range(0, 3001, 100):
-        status = Status(run="r", phase="running", epoch=epoch, epochs=3000, driver="q")
-        story.follow(status, wire, said)  # pyright: ignore
+        story.follow(Status(run="r", phase="running", epoch=epoch, epochs=3000, driver="q"), wire, said)  # pyright: ignore
         story.beat(wire)  # pyright: ignore
     assert not wire.asked
     assert not said
@@ -94,7 +111,7 @@ def test_a_demo_that_nobody_watches_is_left_alone():
 def test_the_papers_number_is_told_of_the_papers_system_alone(learner, given, options, fmus, is_it):
     arena = arenas.load(options.get("arena", "paper"))
     meta = make_setup(learner, **given).agent(World(run="r", arena=arena, seed=0, epochs=3000)).checkpoint()[0]
-    assert demo.is_the_papers(meta, up.UpOptions(**options), FmuOptions(**fmus)) is is_it
+    assert demo.is_the_papers(meta, UpOptions(**options), FmuOptions(**fmus)) is is_it
 
 
 def test_success_is_told_of_episodes_that_have_ended():
@@ -112,7 +129,7 @@ def test_success_is_told_of_episodes_that_have_ended():
 )
 def test_a_recording_tells_success_of_episodes_that_have_ended(episodes, words):
     summary = Summary("r", "paper", episodes=episodes, reached=min(3, episodes), recent=0.4)
-    assert words in table([Recording(Path("r.rrd"), 1, 0.0, summary)])[1]
+    assert words in table([RecordingFile(Path("r.rrd"), 1, 0.0, summary)])[1]
 
 
 def test_the_end_says_how_to_look_again(tmp_path, monkeypatch):
@@ -141,14 +158,14 @@ def test_a_busy_port_says_who_holds_it(monkeypatch):
 
 def test_a_missing_package_names_its_extra():
     assert extra_with("torch", "agent") == "agent"
-    assert extra_with("fmpy", "sensors,fmu") == "sensors,fmu"
+    assert extra_with("fmpy", "fmu") == "fmu"
     assert extra_with("no_such_package", "lab") == "lab"
 
 
 @pytest.mark.parametrize("words", [["--checkpoint=c.npz"], ["--policy", "p.zip"], ["--take-over"], ["--worlds", "a,b"]])
 def test_the_launchers_own_agents_are_not_those_that_are_started_alone(words):
     with pytest.raises(UserError, match=f"{words[0].split('=')[0]} is for an agent that is started alone"):
-        up.parse(words)
+        parse(words)
 
 
 def test_a_swap_says_what_delays_it():
@@ -156,3 +173,47 @@ def test_a_swap_says_what_delays_it():
     assert "phototaxis control resume" in swap.what_delays(Status(run="r", phase="paused"))
     with pytest.raises(Unavailable, match="the run r is finished"):
         swap.what_delays(Status(run="r", phase="finished"))
+
+
+@pytest.fixture
+def processes(tmp_path: Path) -> Processes:
+    options = UpOptions(out=str(tmp_path), swap="100:mirror")
+    return Processes(options, FmuOptions(), ["--percept=rich"], RunFolder(tmp_path), [1, 2])
+
+
+def test_processes_start_and_end_as_the_table_of_roles_says(processes: Processes, monkeypatch: pytest.MonkeyPatch):
+    told = []
+    monkeypatch.setattr(Child, "start", lambda child: told.append(child.name))
+    monkeypatch.setattr(Child, "stop", lambda child, patience: told.append((child.name, patience)))
+    processes.start()
+    assert told == ["sim", "sensors", "agent-2", "recorder"], "the first agent joins when these are on the bus"
+    told.clear()
+    processes.another_agent(["--learner=qtable"])
+    processes.stop()
+    ends = [("recorder", 60), ("agent", 15), ("agent-2", 15), ("agent-3", 15), ("sensors", 5), ("sim", 5)]
+    assert told == ["agent-3", *ends]
+
+
+def test_the_first_agent_waits_for_all_others(processes: Processes):
+    first, second = processes.agents
+    second.idents.append("mirror-1")
+    there = ["sim/s", "sensors/s", "agent/mirror-1", "observer/o"]
+    assert processes.missing(Status(run="r", phase="waiting", alive=there, next=["mirror-1"])) == ["recorder"]
+    there.append("recorder/r")
+    assert processes.missing(Status(run="r", phase="waiting", alive=there)) == ["agent-2"]
+    assert processes.missing(Status(run="r", phase="waiting", alive=there, next=["mirror-1"])) == []
+    processes.go_on_without_recorder(Unavailable("recorder: the disk is full"))
+    assert processes.complete(Status(run="r", phase="running", alive=there[:3]))
+    assert [str(fault) for fault in processes.faults()] == ["recorder: the disk is full"]
+    assert first.idents == []
+
+
+def test_a_slow_or_silent_part_is_named_once(tmp_path: Path):
+    said = Said()
+    news = News(said, RunFolder(tmp_path), FmuOptions(light_fmu="lag.fmu"))  # pyright: ignore
+    silent = Status(run="r", phase="waiting", driver="q-1", waited=6.0, tick=3)
+    for status in (silent, silent, Status(run="r", phase="running", driver="q-1"), silent):
+        news.follow(status)
+    complaints = [line for line in said if "does not answer tick 3" in line]
+    assert len(complaints) == 2, "again, when it begins again"
+    assert complaints[0].endswith("(the sensors use lag.fmu)")

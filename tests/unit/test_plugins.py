@@ -9,7 +9,7 @@ from phototaxis.errors import UserError
 from phototaxis_agent.__main__ import read
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab import experiment, train
-from phototaxis_launcher import up
+from phototaxis_launcher.options import parse
 from plugins import HEAD, install
 
 LINE = HEAD.count("\n") + 1
@@ -55,7 +55,7 @@ def options(field: str) -> str:
 )
 def test_an_odd_learner_is_named_in_one_line(site: Path, code: str, message: str):
     install(site, "odd", code, "Odd")
-    for command in (lambda: train.main(["--learner", "odd", "--epochs", "10"]), lambda: up.parse(["--learner", "odd"])):
+    for command in (lambda: train.main(["--learner", "odd", "--epochs", "10"]), lambda: parse(["--learner", "odd"])):
         with pytest.raises(UserError, match=message) as caught:
             command()
         assert "\n" not in str(caught.value)
@@ -66,7 +66,7 @@ def test_a_hyperparameter_that_only_one_command_has_as_an_option_is_refused_ther
     install(site, "odd", options("swap: int = 3"), "Odd")
     assert read(["--learner", "odd", "--swap", "4"])[1].hyperparameters.swap == 4
     with pytest.raises(UserError, match="calls a hyperparameter 'swap'"):
-        up.parse(["--learner", "odd"])
+        parse(["--learner", "odd"])
 
 
 def test_what_is_true_by_default_can_be_switched_off(site: Path):
@@ -97,7 +97,7 @@ def test_a_broken_learner_keeps_no_help_from_being_shown(site: Path, capsys: pyt
 )
 def test_an_agents_options_are_checked_before_anything_is_started(words: str, message: str):
     with pytest.raises(UserError, match=re.escape(message)):
-        up.parse(words.split())
+        parse(words.split())
 
 
 def test_options_by_name_are_told_by_name():

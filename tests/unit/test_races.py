@@ -11,7 +11,8 @@ from phototaxis import checkpoint
 from phototaxis.component import made_up
 from phototaxis.errors import UserError
 from phototaxis.messages import World
-from phototaxis_launcher import folder, recordings
+from phototaxis_launcher import folder
+from phototaxis_recorder import recordings
 from phototaxis_recorder.file import fresh_file
 
 MANY = 8

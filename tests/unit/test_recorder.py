@@ -11,15 +11,14 @@ from disks import no_file_larger_than
 from phototaxis.arena import Arena, Light, Wall
 from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
 from phototaxis.ports import free_ports
-from phototaxis.recordings import Recording as Listed
-from phototaxis.recordings import Summary, summary_file
 from phototaxis.task import ACTIONS, PERCEPTS
-from phototaxis_launcher.recordings import DAY, MEGABYTE, excess
 from phototaxis_recorder import policy
 from phototaxis_recorder.colors import of_distance, of_reward
 from phototaxis_recorder.field import CELLS, light_field
 from phototaxis_recorder.file import fresh_file
+from phototaxis_recorder.recordings import DAY_S, MEGABYTE, excess
 from phototaxis_recorder.sinks import Recording
+from phototaxis_recorder.summary import RecordingFile, Summary, summary_file
 from phototaxis_recorder.translate import Translator
 from phototaxis_sensors.light import LightModel
 from phototaxis_sensors.model import Past
@@ -77,8 +76,8 @@ def test_the_arrow_points_where_the_action_drives():
 
 
 def test_old_and_excessive_recordings_go_and_the_one_in_use_stays():
-    now = 100.0 * DAY
-    found = [Listed(Path(str(age)), 10 * MEGABYTE, now - age * DAY, None) for age in (0, 1, 2, 3)]
+    now = 100.0 * DAY_S
+    found = [RecordingFile(Path(str(age)), 10 * MEGABYTE, now - age * DAY_S, None) for age in (0, 1, 2, 3)]
     assert excess(found, now, None, None) == []
     assert [one.file.name for one in excess(found, now, 1.5, None)] == ["2", "3"]
     assert [one.file.name for one in excess(found, now, None, 25)] == ["2", "3"]

@@ -1,11 +1,16 @@
 """Sensors: geometry that can be checked by hand, and purity."""
 
 import math
+from importlib.metadata import Distribution
+from pathlib import Path
 
 import msgspec
 import pytest
 from phototaxis.arena import Arena, Light, Wall
+from phototaxis.errors import UserError
+from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
+from phototaxis_sensors import choice
 from phototaxis_sensors.noise import uniform
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim.physics import Pose
@@ -77,3 +82,30 @@ def test_noise_does_not_change_between_versions():
     assert abs(sample.mean()) < 0.02
     assert -1 <= sample.min() < -0.99
     assert 0.99 < sample.max() < 1
+
+
+def test_models_of_an_installed_package_are_found_by_its_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "blind_models.py").write_text(
+        "from phototaxis_sensors.choice import BuiltInChoice\n"
+        "class Blind(BuiltInChoice):\n"
+        "    closed = []\n"
+        "    def __init__(self, options, one_cpu): self.file = options.light_fmu\n"
+        "    def try_out(self): assert self.file == 'some.fmu'\n"
+        "    def close(self): self.closed.append(self)\n"
+    )
+    about = tmp_path / "blind-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: blind\nVersion: 1\n")
+    (about / "entry_points.txt").write_text("[phototaxis.sensors]\nfmu = blind_models:Blind\nbroken = blind_gone:Any\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(choice, "entry_points", lambda group: Distribution.at(about).entry_points.select(group=group))
+    with choice.choose(FmuOptions(light_fmu="some.fmu")) as models:
+        assert type(models).__name__ == "Blind"
+        assert not models.closed  # pyright: ignore
+    assert models.closed == [models]  # pyright: ignore
+    with choice.choose(FmuOptions()) as models:
+        assert type(models) is choice.BuiltInChoice
+    with pytest.raises(UserError, match=r"'broken' need the package blind_gone; install it .*'phototaxis\[broken\]'"):
+        choice.provider("broken")
+    with pytest.raises(UserError, match=r"of the kind 'brokn'; did you mean broken\? there are: fmu, b"):
+        choice.provider("brokn")

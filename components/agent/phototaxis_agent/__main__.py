@@ -9,11 +9,12 @@ from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.disk import try_file
 from phototaxis.errors import UserError
 from phototaxis.messages import Count, Seed, World
+from phototaxis.seat_client import Mode
 from phototaxis.session import WorldNames
 
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.policies import load_policy
-from phototaxis_agent.server import Mode, Server
+from phototaxis_agent.server import serve
 from phototaxis_agent.setup import Setup, parse_setup
 
 
@@ -79,12 +80,12 @@ def main(argv: Sequence[str] | None = None) -> None:
     def make(world: World) -> Agent:
         return policy(world, setup.task.cap) if policy else setup.agent(world, seed=options.agent_seed)
 
-    def serve(bus: Bus) -> None:
+    def serve_world(bus: Bus) -> None:
         path = kept / f"{bus.name}.npz" if kept is not None and worlds else kept
         resume = Path(options.resume) if options.resume else path if options.restarted else None
-        Server(bus, make, path, resume, bool(options.resume), mode, options.at).serve()
+        serve(bus, make, path, resume, bool(options.resume), mode, options.at)
 
-    run("agent", options, serve, "policy" if options.policy else setup.learner, worlds)
+    run("agent", options, serve_world, "policy" if options.policy else setup.learner, worlds)
 
 
 if __name__ == "__main__":

@@ -9,16 +9,19 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from queue import Empty, SimpleQueue
-from typing import Any, NamedTuple
+from threading import Thread
+from typing import Any
 
 import zenoh
 from zenoh.handlers import Callback
 
 from phototaxis.codec import Decoder, Refused, encode
+from phototaxis.machine import STOP, Answer, Ask, Event, Refusal
 from phototaxis.messages import ControlReply, LogRequest, Message
-from phototaxis.topics import ROLES, TOPICS, Topic, alive_key
+from phototaxis.roles import ROLES
+from phototaxis.topics import TOPICS, Topic, alive_key
 
 GRACE = 0.5
 """Seconds after a query's timeout in which Zenoh should have ended it."""
@@ -26,17 +29,6 @@ REQUESTS: dict[str, type[Message]] = {"log": LogRequest}
 
 
 Reach = Callable[[str], AbstractContextManager[zenoh.Session | None]]
-
-
-class Event(NamedTuple):
-    """One thing that happened: a message or a request on a topic, a token, or the order to stop."""
-
-    topic: str
-    """A topic's name, "alive", "gone" or "stop"."""
-    message: Any = None
-    """The decoded message; for "alive" and "gone" the (role, id) of the component."""
-    reply: Callable[[Message | bytes], None] | None = None
-    """For a request: sends one reply (may be called several times)."""
 
 
 class Bus:
@@ -82,13 +74,15 @@ class Bus:
             self._at_times.pop(topic).undeclare()
 
     def receive(self, timeout: float | None = None) -> Event | None:
-        """The next event; None when `timeout` seconds brought nothing, or something that was refused."""
+        """The next event; None when `timeout` seconds brought nothing."""
         try:
             source, item = self._inbox.get(timeout=timeout)
         except Empty:
             return None
         if source == "stop":
-            return Event("stop")
+            return STOP
+        if source == "answer":
+            return Event("answer", item)
         if source == "token":
             _, role, ident = str(item.key_expr).rsplit("/", 2)
             return Event("alive" if item.kind == zenoh.SampleKind.PUT else "gone", (role, ident))
@@ -98,7 +92,7 @@ class Bus:
             return Event(source, self._decoders[source](item.payload.to_bytes()))
         except Refused as why:
             self.refuse(source, str(why))
-            return None
+            return Event("refused", Refusal(source, str(why)))
 
     def stop(self) -> None:
         """Make `receive` return a "stop" event; may be called from a signal handler or another thread."""
@@ -138,6 +132,24 @@ class Bus:
             if reply.ok is not None:
                 yield reply.ok.payload.to_bytes()
 
+    def ask_aside(self, ask: Ask) -> None:
+        """Send a query without waiting: its answers come as an "answer" event."""
+        Thread(target=self._gather, args=(ask,), daemon=True).start()
+
+    def _gather(self, ask: Ask) -> None:
+        """Wait for the answers of a query, in a thread of its own."""
+        found: list[Message] = []
+        decoder = self._answers(ask.topic)
+        with suppress(zenoh.ZError), self._reach(ask.agent) if ask.agent else nullcontext(self._session) as session:
+            for payload in self.ask(ask.topic, ask.request, ask.timeout, session) if session is not None else ():
+                try:
+                    found.append(decoder(payload))
+                except Refused as why:
+                    self.refuse(ask.topic, str(why))
+                if found and not ask.every:
+                    break
+        self._inbox.put(("answer", Answer(ask.tag, found)))
+
     def ask_agent(self, ident: str, topic: str, request: Message, timeout: float) -> Any:
         """The answer of one agent as a message; None when it is not there, or gives none in time."""
         with self._reach(ident) as session:
@@ -147,8 +159,7 @@ class Bus:
         self, topic: str, request: Message | None = None, timeout: float = 2.0, session: zenoh.Session | None = None
     ) -> Any:
         """The first valid reply as a message, or None."""
-        asked = TOPICS[topic]
-        decoder = Decoder(asked.reply, asked.reply_limit) if asked.reply else Decoder(asked.message, asked.limit)
+        decoder = self._answers(topic)
         for payload in self.ask(topic, request, timeout, session):
             try:
                 return decoder(payload)
@@ -181,6 +192,11 @@ class Bus:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _answers(self, topic: str) -> Decoder[Any]:
+        """What decodes the answers to a query."""
+        asked = TOPICS[topic]
+        return Decoder(asked.reply, asked.reply_limit) if asked.reply else Decoder(asked.message, asked.limit)
 
     def _subscribe(self, topic: Topic) -> zenoh.Subscriber:
         self._decoders[topic.name] = Decoder(topic.message, topic.limit)

@@ -17,16 +17,10 @@ from msgspec import Meta
 
 from phototaxis.bus import Bus
 from phototaxis.errors import ComponentFailed, UserError, leave, one_line
+from phototaxis.roles import ROLES
 from phototaxis.session import BusOptions, open_session, place, reaching
 from phototaxis.words import WORD
 
-WAITS_FOR = {
-    "sim": "sensors and an agent",
-    "sensors": "a simulation",
-    "agent": "a simulation and its sensors",
-    "recorder": "a simulation, its sensors and an agent",
-}
-"""Whom a component needs before anything happens, by its role."""
 ORDERLY = 60.0
 """Seconds that a component gets to end in good order when the process that it is tethered to is gone."""
 
@@ -66,7 +60,7 @@ def run(
             own = msgspec.structs.replace(options, name=name)
             session = stack.enter_context(open_session(role, own, ident))
             buses.append(stack.enter_context(Bus(session, name, role, ident, partial(reaching, session, own))))
-            line = f"{ident}: {role} of the world '{name}', {place(own)}; waits for {WAITS_FOR[role]}"
+            line = f"{ident}: {role} of the world '{name}', {place(own)}; waits for {ROLES[role].waits_for}"
             print(line, file=sys.stderr, flush=True)
         stop, signals = partial(_stop, buses), list[int]()
         for number in (signal.SIGTERM, signal.SIGINT):

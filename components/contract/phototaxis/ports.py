@@ -1,4 +1,4 @@
-"""Ports of this machine that nothing listens on."""
+"""Ports of this machine: those that nothing listens on, and where the live view is found on those it is given."""
 
 import os
 import socket
@@ -39,6 +39,11 @@ def find_ports(host: str, wanted: Mapping[str, int]) -> list[int]:
                 ) from None
             found.append(server.getsockname()[1])
     return found
+
+
+def viewer_url(web_port: int, grpc_port: int) -> str:
+    """The whole address of the web viewer on this machine, already connected to the recording."""
+    return f"http://localhost:{web_port}/?url=rerun%2Bhttp%3A%2F%2Flocalhost%3A{grpc_port}%2Fproxy"
 
 
 def _holder(port: int) -> str:

@@ -6,7 +6,8 @@ A component's name at the router is WORLD.ROLE: its user name, or the common nam
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-from phototaxis.topics import ROLES, TOPICS, alive_key
+from phototaxis.roles import ROLES
+from phototaxis.topics import TOPICS, alive_key
 
 LONGEST_KEY = 256
 

@@ -15,8 +15,8 @@ from msgspec import Meta, Struct
 
 from phototaxis import doors
 from phototaxis.errors import Unavailable, UserError
+from phototaxis.roles import ROLES
 from phototaxis.sockets import agent_socket, in_use, one_after_another, socket_folder, sweep
-from phototaxis.topics import ROLES
 
 _WORLD = r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,39}"
 _FORM = "up to 40 letters, digits, '_', '.' and '-', the first none of the last two"

@@ -1,4 +1,4 @@
-"""The one table of topics and the one table of roles; keys, subscriptions, limits and QoS derive from them."""
+"""The one table of topics; keys, subscriptions, limits and QoS derive from it."""
 
 from typing import Literal, NamedTuple
 
@@ -80,31 +80,18 @@ TOPICS = {
 }
 
 
-class Role(NamedTuple):
-    """What one kind of component listens to, and whom it dials where no router is used."""
+class StepTopics(NamedTuple):
+    """The three topics of the step protocol."""
 
-    reads: tuple[str, ...]
-    dials: tuple[str, ...]
-    listens: bool = True
-    asks: tuple[str, ...] = ()
-    """Queries that it sends (of what it reads it may ask, too)."""
-    at_times: tuple[str, ...] = ()
-    """What it also reads, but only while it needs it."""
+    state: str
+    readings: str
+    command: str
 
 
-ROLES = {
-    "sim": Role(reads=("command", "crowd/command", "recording"), dials=(), at_times=("readings", "crowd/readings")),
-    "sensors": Role(reads=("state", "crowd/state"), dials=("sim",), asks=("world", "log/sim")),
-    "recorder": Role(reads=("log/sim", "log/sensors", "log/agent"), dials=("sim", "sensors"), asks=("world",)),
-    "agent": Role(
-        reads=("readings", "crowd/readings"),
-        dials=("sim", "sensors", "recorder"),
-        asks=("world", "control", "checkpoint"),
-    ),
-    "launcher": Role(reads=("status",), dials=("sim",), asks=("control",)),
-    "observer": Role(reads=("status",), dials=("sim", "launcher"), listens=False, asks=("world", "control", "launch")),
-}
-"""sim listens, the others dial it. Agents come and go freely: they dial, and listen only for their successors."""
+def step_topics(robots: int) -> StepTopics:
+    """Where the step protocol of a world with so many robots is spoken."""
+    prefix = "crowd/" if robots > 1 else ""
+    return StepTopics(*(f"{prefix}{name}" for name in StepTopics._fields))
 
 
 def alive_key(prefix: str, role: str, ident: str) -> str:

@@ -19,7 +19,7 @@ from phototaxis_gym.draw import SIDE, Canvas, Window, frame_rate, tiles
 from phototaxis_gym.errors import EpisodeOver
 from phototaxis_gym.memories import Memories
 from phototaxis_gym.place import ManyHere, Places
-from phototaxis_gym.remote import ManyThere
+from phototaxis_gym.remote_many import ManyThere
 from phototaxis_gym.resets import given_poses, reset_mask, row_seeds, run_seed
 from phototaxis_gym.spaces import actions, motors_of_many, observation, rewards, valid_cap, valid_percept
 

@@ -5,9 +5,10 @@ import time
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from phototaxis.bus import Bus, Event
+from phototaxis.bus import Bus
 from phototaxis.codec import encode
 from phototaxis.errors import ComponentFailed, Unavailable
+from phototaxis.machine import Event
 from phototaxis.messages import Command, Control, ControlReply, Readings, Status, World, run_name
 from phototaxis.options import flags
 from phototaxis.session import BusOptions, open_session

@@ -14,7 +14,7 @@ from phototaxis.session import BusOptions, open_session
 
 from phototaxis_launcher.progress import success
 
-PATIENCE = 2.0
+ANSWERS_WITHIN_S = 2.0
 
 
 class StatusOptions(BusOptions, kw_only=True):
@@ -44,9 +44,9 @@ def request(options: BusOptions, control: Control) -> ControlReply:
         when there is none, or it does not answer.
     """
     with open_session("observer", options) as session, Bus(session, options.name, "observer", "ask") as bus:
-        if not bus.wait_for("sim", PATIENCE):
+        if not bus.wait_for("sim", ANSWERS_WITHIN_S):
             raise Unavailable(f"no simulation in the world '{options.name}'; start one with: phototaxis up")
-        reply = bus.control(control, timeout=PATIENCE)
+        reply = bus.control(control, timeout=ANSWERS_WITHIN_S)
     if reply is None:
         raise Unavailable(f"the simulation of '{options.name}' does not answer; is it stopped or overloaded?")
     return reply

@@ -13,9 +13,9 @@ from phototaxis.disk import make_folder, try_folder, unwritten
 from phototaxis.errors import UserError
 from phototaxis.options import parse
 from phototaxis.rights import subject
+from phototaxis.roles import ROLES
 from phototaxis.router import Auth, client_config, router_config, text
 from phototaxis.session import WorldNames
-from phototaxis.topics import ROLES
 
 MADE_BY = "phototaxis certs"
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from phototaxis import __version__
 from phototaxis.errors import UserError, leave, one_line
+from phototaxis.roles import COMPONENTS
 from phototaxis.words import known
 
 
@@ -35,13 +36,10 @@ VERBS = {
     "check": Verb(
         "phototaxis_lab.check:main", "lab", "an agent against the contract; rights and wire format against the code"
     ),
-    "sim": Verb("phototaxis_sim.__main__:main", "sim", "the simulation alone"),
-    "sensors": Verb("phototaxis_sensors.__main__:main", "sensors", "the sensors alone"),
-    "agent": Verb("phototaxis_agent.__main__:main", "agent", "an agent alone"),
-    "recorder": Verb("phototaxis_recorder.__main__:main", "recorder", "the recorder alone"),
-    "fmu": Verb("phototaxis_sensors.fmu.cli:main", "sensors,fmu", "look into, check or build FMUs (sensor models)"),
-    "view": Verb("phototaxis_launcher.view:main", "recorder", "the live view or a recording, in a window or browser"),
-    "recordings": Verb("phototaxis_launcher.recordings:main", "launcher", "list recordings; remove old ones"),
+    **{name: Verb(f"phototaxis_{name}.__main__:main", name, role.about) for name, role in COMPONENTS.items()},
+    "fmu": Verb("phototaxis_fmu.cli:main", "fmu", "look into, check or build FMUs (sensor models)"),
+    "view": Verb("phototaxis_recorder.view:main", "recorder", "the live view or a recording, in a window or browser"),
+    "recordings": Verb("phototaxis_recorder.recordings:main", "recorder", "list recordings; remove old ones"),
     "health": Verb("phototaxis_launcher.health:main", "launcher", "is this component on the bus? for health checks"),
     "train": Verb("phototaxis_lab.train:main", "lab", "the same learning in one process, without a bus"),
     "experiment": Verb("phototaxis_lab.experiment:main", "lab", "a grid of agents and seeds, in parallel, resumable"),
@@ -81,7 +79,7 @@ def extra_with(package: str, usual: str) -> str:
     """An extra that brings a package: the usual one, unless another names it."""
     lines = requires("phototaxis") or []
     found = [match[1] for line in lines if (match := re.match(rf"{package}\b.*extra == .([\w-]+)", line))]
-    return usual if not found or {*usual.split(",")} & {*found} else found[0]
+    return usual if not found or usual in found else found[0]
 
 
 def usage() -> str:

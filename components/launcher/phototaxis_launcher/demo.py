@@ -16,10 +16,11 @@ from phototaxis.fmu import FmuOptions
 from phototaxis.messages import Control, Status
 from phototaxis.options import flags
 
-from phototaxis_launcher import up
+from phototaxis_launcher.options import UpOptions, parse
 from phototaxis_launcher.places import places, program
 from phototaxis_launcher.progress import Progress
 from phototaxis_launcher.show import Show
+from phototaxis_launcher.up import Run
 
 TICKS_A_SECOND = 10.0
 """What eyes can follow."""
@@ -35,11 +36,11 @@ PAPERS_EPOCHS = 3000
 
 
 def main(argv: Sequence[str]) -> int:
-    options, fmus, words = up.parse(argv, "phototaxis demo")
+    options, fmus, words = parse(argv, "phototaxis demo")
     watched = sys.stderr.isatty() and not (options.json or options.no_recorder)
     show = Story(options, fmus, stays=watched, paced=bool(watched and options.epochs and not options.speed))
-    run = up.Run(options, fmus, words)
-    status = run.go(Progress(options.epochs), show)
+    run = Run(options, fmus, words, show)
+    status = run.go()
     result = run.result(status)
     if options.json:
         print(json.dumps({**result, "evaluation": show.found}), flush=True)
@@ -62,24 +63,27 @@ class Story(Show):
     found : what the evaluation of the learned policy gave, or None.
     """
 
-    def __init__(self, options: up.UpOptions, fmus: FmuOptions, stays: bool, paced: bool):
+    def __init__(self, options: UpOptions, fmus: FmuOptions, stays: bool, paced: bool):
         self._options, self._fmus, self._stays = options, fmus, stays
         self._fast_from = min(FIRST, options.epochs)
         self._slow_from = max(options.epochs - LAST, self._fast_from)
         self._paced, self._chapter = paced, 0
-        self._before, self._step_at = (0.0, 0), math.inf
+        self._before, self._step_at, self._pause_at = (0.0, 0), math.inf, math.inf
         self.found: dict[str, Any] | None = None
 
     def wait(self) -> float:
         """Seconds until the next step is due."""
-        return min(max(self._step_at - time.monotonic(), 0.0), super().wait())
+        return min(max(min(self._step_at, self._pause_at) - time.monotonic(), 0.0), super().wait())
 
     def beat(self, bus: Bus) -> None:
-        """Make one step of the paused run where one is due: unlike a clock, it waits for a late answer.
+        """Pause where the last chapter begins; make one step of the paused run where one is due.
 
-        So the learner learns what it learns at full speed.
+        Unlike a clock, a step waits for a late answer, so the learner learns what it learns at full speed.
         """
         now = time.monotonic()
+        if now >= self._pause_at:
+            bus.control(Control(verb="pause"))
+            self._step_at, self._pause_at = time.monotonic(), math.inf
         if now >= self._step_at:
             bus.control(Control(verb="step"))
             self._step_at = max(self._step_at + 1 / TICKS_A_SECOND, now)
@@ -103,10 +107,8 @@ class Story(Show):
         elif self._chapter == 2:
             made = status.epoch - epoch
             if status.epoch + made >= self._slow_from:  # the next status would come too late
-                time.sleep(max(self._slow_from - status.epoch, 0) / max(made, 1) * (now - then))
-                bus.control(Control(verb="pause"))
+                self._pause_at = now + max(self._slow_from - status.epoch, 0) / max(made, 1) * (now - then)
                 self._turn(progress, f"It has learned: watch it turn to the light, until epoch {status.epochs}.")
-                self._step_at = time.monotonic()
 
     def _turn(self, progress: Progress, text: str) -> None:
         self._chapter += 1
@@ -149,7 +151,7 @@ class Story(Show):
         return [*lines, "", *(f"  {line}" for line in places(result)), ""]
 
 
-def is_the_papers(meta: Meta, options: up.UpOptions, fmus: FmuOptions) -> bool:
+def is_the_papers(meta: Meta, options: UpOptions, fmus: FmuOptions) -> bool:
     """Whether a run was of the system for which the paper reports its 80%."""
     system = (meta.learner, meta.percept, meta.arena, options.epochs, options.robots, options.swap)
     return (

@@ -1,15 +1,21 @@
 """The folder of a run."""
 
 import shutil
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from phototaxis.disk import make_folder, try_folder, unwritten
+from phototaxis.errors import ComponentFailed, UserError
 from phototaxis.messages import run_name
 
 
 class RunFolder:
     """A fresh folder in `out` that is called as its run; of runs that start at the same moment each has its own.
+
+    Attributes
+    ----------
+    begun : whether the run has begun, so that there is something to keep.
 
     Raises
     ------
@@ -21,6 +27,31 @@ class RunFolder:
         self._made = [part for part in (out.resolve(), *out.resolve().parents) if not part.exists()]
         try_folder(out, "--out", keep=True)  # taken away again, it might be missing to a run that starts now
         self.path = self._fresh(out.resolve())
+        self.begun = False
+
+    @property
+    def run(self) -> str:
+        """The run's name."""
+        return self.path.name
+
+    @property
+    def recordings(self) -> list[Path]:
+        """All recordings that there are, the newest last."""
+        return sorted(self.path.glob("recording*.rrd"), key=lambda file: file.stat().st_mtime)
+
+    def checkpoint(self, agent: str) -> Path:
+        """That of the agent with this name among the launcher's processes."""
+        return self.path / f"{agent.replace('agent', 'checkpoint')}.npz"
+
+    @contextmanager
+    def kept_once_begun(self) -> Iterator[None]:
+        """Remove the folder when the user's input or a missing peer keeps the run from beginning."""
+        try:
+            yield
+        except UserError as error:
+            if not self.begun and not isinstance(error, ComponentFailed):
+                self.remove()
+            raise
 
     def remove(self) -> None:
         """Take the folder away with all that is in it, and what had to be made for it where nothing else is in it."""

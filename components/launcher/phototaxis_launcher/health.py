@@ -2,33 +2,38 @@
 
 import time
 from collections.abc import Sequence
-from typing import Literal
 
 from phototaxis.bus import Bus
-from phototaxis.errors import Unavailable
+from phototaxis.errors import Unavailable, UserError
 from phototaxis.messages import Control
 from phototaxis.options import parse
+from phototaxis.roles import COMPONENTS
 from phototaxis.session import BusOptions, open_session
+from phototaxis.words import known
 
-PATIENCE = 3.0
+ANSWERS_WITHIN_S = 3.0
+"""A component of which nothing is heard for so long is not healthy."""
+ROLES = ("router", *COMPONENTS)
 
 
 class Options(BusOptions, kw_only=True):
     """Options of `phototaxis health`."""
 
-    role: Literal["router", "sim", "sensors", "agent", "recorder"]
-    """router: the bus can be entered; the others: the component's token is there; sim: it answers as well"""
+    role: str
+    """router: the bus can be entered; sim: its token is there, and it answers; another component: its token is there"""
     id: str = ""
     """the component's own --id (default: any component of that role)"""
 
 
 def main(argv: Sequence[str]) -> int:
     options = parse(Options, argv, "phototaxis health", "Succeed if the component is on the bus.", positional=["role"])
+    if options.role not in ROLES:
+        raise UserError(f"ROLE {options.role}: no such role; {known(options.role, ROLES)}")
     with open_session("observer", options) as session:
         if options.role == "router":
             return 0
         with Bus(session, options.name, "observer", "health") as bus:
-            deadline = time.monotonic() + PATIENCE
+            deadline = time.monotonic() + ANSWERS_WITHIN_S
             while (left := deadline - time.monotonic()) > 0:
                 event = bus.receive(timeout=left)
                 if event is None or event.topic != "alive" or event.message[0] != options.role:

@@ -1,178 +1,100 @@
-"""Child processes: started, watched, restarted when they die, and always ended."""
+"""The processes of a run: one for each component of the table of roles, and any number of agents."""
 
-import os
-import subprocess
-import sys
-import time
-from collections import deque
-from pathlib import Path
-from typing import IO
+from phototaxis.errors import Unavailable, UserError
+from phototaxis.fmu import FmuOptions
+from phototaxis.messages import Status
+from phototaxis.options import flags
+from phototaxis.roles import COMPONENTS
 
-from phototaxis.component import made_up
-from phototaxis.disk import try_file, unwritten
-from phototaxis.errors import ERROR, WARNING, ComponentFailed, Unavailable, UserError
-
-RESTARTS = 3
-WITHIN = 20.0
-"""A component that dies more than RESTARTS times within this many seconds keeps dying."""
-MENDABLE = {2: UserError, 3: Unavailable, 4: ComponentFailed}
-"""Exit codes by which a component says in a line why it ends; it is not restarted, it would end the same."""
+from phototaxis_launcher.child import Child
+from phototaxis_launcher.folder import RunFolder
+from phototaxis_launcher.options import UpOptions, learner_of, successor, swap_plan
 
 
-class Child:
-    """One component process; its stderr goes to a file.
-
-    It is tethered: when this process ends, however it ends, the child's standard input closes and the
-    child leaves.
+class Processes:
+    """The children of a launcher.
 
     Parameters
     ----------
-    name : names its log file, and it in messages.
-    module : Python module that is its program.
-    label : if given, each start gets a name on the bus that begins with it.
-    may_leave : whether it may end by itself, without an error; otherwise it is restarted then too.
+    words : options of the first agent.
+    ports : those of the recorder, for Rerun and for its page; without them nothing is recorded.
 
     Attributes
     ----------
-    idents : the names on the bus that it had, the newest last.
-    left : it ended by itself, without an error.
+    children : by role; of the agents the first.
+    agents : all of them: the first, and those that take over from it.
     """
 
-    def __init__(
-        self, name: str, module: str, arguments: list[str], folder: Path, label: str = "", may_leave: bool = False
-    ):
-        self.name, self.label, self._may_leave = name, label, may_leave
-        self._module, self._arguments = module, arguments
-        self._log, self._read = folder / f"{name}.log", 0
-        self.idents: list[str] = []
-        self.left = False
-        self._deaths: deque[float] = deque(maxlen=RESTARTS + 1)
-        self.restarts = 0
-        self.process: subprocess.Popen[bytes] | None = None
+    def __init__(self, options: UpOptions, fmus: FmuOptions, words: list[str], folder: RunFolder, ports: list[int]):
+        self._folder, self._bus, self._words = folder, options.bus_flags(), words
+        self._lost: list[UserError] = []
+        self.agents: list[Child] = []
+        arguments = {
+            "sim": [
+                f"--run={folder.run}", f"--arena={options.arena}", f"--seed={options.seed}",
+                f"--epochs={options.epochs}", f"--speed={options.speed}", f"--robots={options.robots}",
+                f"--journal={folder.path / 'sim.journal'}",
+            ],
+            "sensors": flags(fmus),
+        }  # fmt: skip
+        if ports:
+            output, (grpc, web) = folder.path / "recording.rrd", ports
+            arguments["recorder"] = [f"--output={output}", f"--grpc-port={grpc}", f"--web-port={web}"]
+        self.children = {role: self._child(role, role, own) for role, own in arguments.items()}
+        self.children["agent"] = self._agent(words)
+        for tick, learner in swap_plan(options.swap):
+            self._agent(successor(words, ["--learner", learner]), "--take-over", f"--at={tick}")
 
-    def start(self, *extra: str) -> None:
-        """Start the process in a session of its own, so that Ctrl-C reaches the launcher alone."""
-        if self.label:
-            self.idents.append(made_up(self.label))
-            extra = *extra, f"--ident={self.idents[-1]}"
-        with self._open_log() as log:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", self._module, "--tethered", *self._arguments, *extra],
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=log,
-                start_new_session=True,
-                env=os.environ | {"PYTHONFAULTHANDLER": "1"},  # where a crash happened, in the log
-            )
+    def _child(self, role: str, name: str, words: list[str], label: str = "") -> Child:
+        arguments, may_leave = [*self._bus, *words], COMPONENTS[role].may_leave
+        return Child(name, f"phototaxis_{role}", arguments, self._folder.path, label=label, may_leave=may_leave)
 
-    def _open_log(self) -> IO[bytes]:
-        try:
-            return self._log.open("ab")
-        except OSError as error:
-            raise unwritten(self._log, error) from None
+    def _agent(self, words: list[str], *more: str) -> Child:
+        name = f"agent-{len(self.agents) + 1}" if self.agents else "agent"
+        own = f"--checkpoint={self._folder.checkpoint(name)}"
+        self.agents.append(self._child("agent", name, [own, *words, *more], learner_of(words)))
+        return self.agents[-1]
 
-    def watch(self) -> bool:
-        """Restart the process if it has died; whether it had to. One that may leave and did has `left`.
+    def another_agent(self, words: list[str]) -> Child:
+        """Start one more agent, which takes the seat over as soon as it can."""
+        child = self._agent(successor(self._words, words), "--take-over")
+        child.start()
+        return child
 
-        Raises
-        ------
-        UserError, Unavailable, ComponentFailed
-            when it ended with a line that says why.
-        ComponentFailed
-            also when it keeps dying; the text ends with its stderr.
-        """
-        if self.process is None or self.process.poll() is None:
-            return False
-        code = self.process.returncode
-        if code == 0 and self._may_leave:
-            self.left = True
-            return False
-        if code in MENDABLE:
-            raise MENDABLE[code](self.fault())
-        self.bring_back()
-        return True
+    def all(self) -> list[Child]:
+        """Every process, the agents last."""
+        return [*(child for child in self.children.values() if child not in self.agents), *self.agents]
 
-    def bring_back(self) -> None:
-        """Start it again after it has ended though it should not.
+    def start(self) -> None:
+        """Start all but the first agent, which joins when the others are there."""
+        for name, role in COMPONENTS.items():
+            for child in self._of(name)[1 if role.joins_last else 0 :]:
+                child.start()
 
-        Raises
-        ------
-        ComponentFailed
-            when it keeps dying; the text ends with its stderr.
-        """
-        if self.process is None:
-            return
-        self._deaths.append(time.monotonic())
-        if len(self._deaths) > RESTARTS and self._deaths[-1] - self._deaths[0] < WITHIN:
-            who = f"{self.name} (learner {self.label})" if self.label else self.name
-            words = self.last_words()
-            raise ComponentFailed(
-                f"{who} died {len(self._deaths)} times, last with {_meaning(self.process.returncode)}; "
-                + (f"its last words:\n{words}" if words else "it said nothing")
-            )
-        self.left = False
-        self.restarts += 1
-        self.start("--restarted")
+    def missing(self, status: Status) -> list[str]:
+        """Whom the first agent still waits for: who is not on the bus, or has not asked for its turn."""
+        joined = {who.split("/")[0] for who in status.alive}
+        absent = {role for role in self.children if not COMPONENTS[role].joins_last} - joined
+        return sorted(absent) or [agent.name for agent in self.agents[1:] if not {*agent.idents} & {*status.next}]
 
-    def stop(self, patience: float) -> None:
-        """Ask the process to end, and end it when it does not within `patience` seconds."""
-        if self.process is None:
-            return
-        if self.process.poll() is None:
-            self.process.terminate()
-            try:
-                self.process.wait(patience)
-            except subprocess.TimeoutExpired:
-                print(
-                    f"phototaxis: {self.name} did not end within {patience:g} s and was killed",
-                    file=sys.stderr,
-                )
-                self.process.kill()
-                self.process.wait()
-        if self.process.stdin is not None:
-            self.process.stdin.close()
+    def complete(self, status: Status) -> bool:
+        """Whether all are on the bus."""
+        return self.children.keys() <= {who.split("/")[0] for who in status.alive}
 
-    def warnings(self) -> list[str]:
-        """The warnings (`phototaxis.errors.warn`) that it wrote since this was asked last."""
-        try:
-            with self._log.open("rb") as log:
-                log.seek(self._read)
-                written = log.read()
-        except FileNotFoundError:
-            return []
-        whole = written[: written.rfind(b"\n") + 1]
-        self._read += len(whole)
-        lines = whole.decode(errors="replace").splitlines()
-        return [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
+    def stop(self) -> None:
+        """End every process, in the opposite order."""
+        for name, role in reversed(COMPONENTS.items()):
+            for child in self._of(name):
+                child.stop(role.ends_within_s)
 
-    def last_words(self) -> str:
-        """What it wrote before it died; of a crash in compiled code, where that was."""
-        fatal = self.tail(100).rpartition("Fatal Python error")
-        return "\n".join((fatal[1] + fatal[2]).splitlines()[:6]) if fatal[1] else self.tail(20)
+    def _of(self, role: str) -> list[Child]:
+        return self.agents if role == "agent" else [self.children[role]] if role in self.children else []
 
-    def fault(self) -> str:
-        """The line with which it ended because of something that the user can mend; "" when it did not."""
-        if self.process is None or self.process.returncode not in MENDABLE:
-            return ""
-        said = [line for line in self.tail(20).splitlines() if line.startswith(ERROR)]
-        if said:
-            return f"{self.name}: {said[-1].removeprefix(ERROR)}"
-        return f"{self.name}: exit code {self.process.returncode}; {self._why_no_word()}"
+    def go_on_without_recorder(self, error: UserError) -> None:
+        """Forget the recorder, which has ended before the run."""
+        del self.children["recorder"]
+        self._lost.append(error)
 
-    def _why_no_word(self) -> str:
-        try:
-            try_file(self._log, "its log")
-        except UserError as error:
-            return str(error)
-        return f"see {self._log}"
-
-    def tail(self, lines: int) -> str:
-        """The last lines it wrote."""
-        try:
-            return "\n".join(self._log.read_text(errors="replace").splitlines()[-lines:])
-        except FileNotFoundError:
-            return ""
-
-
-def _meaning(code: int) -> str:
-    return f"signal {-code}" if code < 0 else f"exit code {code}" if code else "exit code 0, before its time"
+    def faults(self) -> list[UserError]:
+        """What ended before its time, or could not be saved to its end."""
+        return [*self._lost, *(Unavailable(fault) for child in self.all() if (fault := child.fault()))]

@@ -5,7 +5,7 @@ import time
 
 from phototaxis.messages import Status
 
-LINE_EVERY = 2.0
+LINE_EVERY_S = 2.0
 
 
 class Progress:
@@ -28,7 +28,7 @@ class Progress:
             self._bar.n = status.epoch
             self._bar.set_postfix_str(facts, refresh=False)
             self._bar.refresh()
-        elif time.monotonic() - self._said >= LINE_EVERY or status.phase == "finished":
+        elif time.monotonic() - self._said >= LINE_EVERY_S or status.phase == "finished":
             self._said = time.monotonic()
             total = f"/{status.epochs}" if status.epochs else ""
             print(f"epoch {status.epoch}{total}  {facts}", file=sys.stderr, flush=True)

@@ -12,9 +12,9 @@ from phototaxis.messages import Control, Launch, LaunchReply, Status
 from phototaxis.options import Parser, add_options, convert
 from phototaxis.session import BusOptions, open_session
 
-from phototaxis_launcher.up import for_ours
+from phototaxis_launcher.options import for_ours
 
-LINKED_WITHIN = 2.0
+LINKED_WITHIN_S = 2.0
 
 
 class Options(BusOptions, kw_only=True):
@@ -49,7 +49,7 @@ def main(argv: Sequence[str]) -> int:
 
 def _ask(options: Options, request: Launch) -> LaunchReply:
     with open_session("observer", options) as session, Bus(session, options.name, "observer", "swap") as bus:
-        if not bus.wait_for("launcher", LINKED_WITHIN):
+        if not bus.wait_for("launcher", LINKED_WITHIN_S):
             raise Unavailable(
                 f"no `phototaxis up` runs the world '{options.name}'; start the agent yourself: "
                 f"phototaxis agent --learner {options.learner} --take-over"

@@ -8,15 +8,15 @@ from typing import Annotated
 
 from msgspec import Meta
 from phototaxis import doors
-from phototaxis.bus import Bus
 from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.disk import try_file, try_folder
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.options import parse
-from phototaxis.page import ViewerPage
-from phototaxis.ports import find_ports
-from phototaxis.viewer import silence_rerun, viewer_url
+from phototaxis.ports import find_ports, viewer_url
+
+from phototaxis_recorder.page import ViewerPage
+from phototaxis_recorder.viewer import silence_rerun
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -44,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         )
     silence_rerun()
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")  # its files get their footer later
-    from phototaxis_recorder.server import Server
+    from phototaxis_recorder.server import serve
     from phototaxis_recorder.sinks import Recording
 
     output = Path(options.output)
@@ -64,11 +64,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     if page is not None:
         print(f"recorder: watch at {viewer_url(web_port, grpc_port)}", file=sys.stderr, flush=True)
 
-    def serve(bus: Bus) -> None:
-        Server(bus, start).serve()
-
     try:
-        run("recorder", options, serve)
+        run("recorder", options, lambda bus: serve(bus, start))
     finally:
         if page is not None:
             page.close()

@@ -9,12 +9,12 @@ import rerun as rr
 from phototaxis.disk import unwritten
 from phototaxis.errors import Unavailable, warn
 from phototaxis.messages import World
-from phototaxis.recordings import write_summary
-from phototaxis.viewer import rerun_program
 
 from phototaxis_recorder.file import RecordingFile
 from phototaxis_recorder.layout import blueprint
+from phototaxis_recorder.summary import write_summary
 from phototaxis_recorder.translate import Translator
+from phototaxis_recorder.viewer import rerun_program
 
 LARGE = 250_000_000
 """Bytes above which a recording is not rewritten at its end: that takes more than twice as much memory."""

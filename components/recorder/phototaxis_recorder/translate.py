@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
-from phototaxis.recordings import Summary
 from phototaxis.task import ACTIONS, PERCEPTS
 
 from phototaxis_recorder import policy
 from phototaxis_recorder.colors import BLUE, of_distance, of_reward
+from phototaxis_recorder.gathering import BEHIND_TICKS
 from phototaxis_recorder.layout import MEAN, PAPER, draw_world
+from phototaxis_recorder.summary import Summary
 
 PATIENCE = 4000
 """Rows of one role that may wait for another's."""
-BEHIND = 64
-"""A role this many ticks behind the newest is not waited for, but asked."""
 WORDS = {"reached": "reached the light", "cap": "gave up", "asked": "was reset"}
 
 
@@ -48,6 +47,15 @@ class Translator:
         self._rewards: deque[float] = deque(maxlen=MEAN)
         self.summary = Summary(world.run, world.arena.name, world.arena.digest)
         draw_world(recording, world.arena)
+
+    def add(self, chunk: SimLog | SensorsLog | AgentLog) -> None:
+        """Buffer a chunk."""
+        if isinstance(chunk, SimLog):
+            self.sim(chunk)
+        elif isinstance(chunk, SensorsLog):
+            self.sensors(chunk)
+        else:
+            self.agent(chunk)
 
     def sim(self, chunk: SimLog) -> None:
         """Poses, commands and ended episodes."""
@@ -93,7 +101,7 @@ class Translator:
         """
         waiting = max(map(len, self._rows.values()))
         known = min(self._newest["sim"], self._newest["sensors"])
-        if known - self._newest["agent"] <= BEHIND:
+        if known - self._newest["agent"] <= BEHIND_TICKS:
             known = min(known, self._newest["agent"])
         until = math.inf if last or waiting > PATIENCE else known
         agent = self._take("agent", until)
@@ -142,11 +150,6 @@ class Translator:
                 rr.log("plots/success/paper", rr.Scalars(PAPER), recording=self._recording)
         self._episodes.clear()
         self.summary.epochs = max(self.summary.tick - self.summary.episodes, 0)
-
-    def behind(self) -> list[str]:
-        """The roles whose chunks do not come: Zenoh may drop them for long once a link was congested."""
-        newest = max(self._newest.values())
-        return [role for role, tick in self._newest.items() if newest - tick > BEHIND]
 
     def event(self, text: str) -> None:
         """Something that happened to the system, told at the newest tick."""

@@ -11,10 +11,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     groups = {"": ComponentOptions, "sensor models": FmuOptions}
     options, models = parse_groups(groups, argv, "phototaxis sensors", "Run the robot's sonars, lights and bumpers.")
     from phototaxis_sensors.choice import choose
-    from phototaxis_sensors.server import Server
+    from phototaxis_sensors.server import serve
 
     with choose(models, one_cpu=True) as make:
-        run("sensors", options, lambda bus: Server(bus, make).serve())
+        run("sensors", options, lambda bus: serve(bus, make))
 
 
 if __name__ == "__main__":

@@ -1,17 +1,23 @@
-"""Which sensor models a suite is made of."""
+"""Which sensor models a suite is made of: the built-in ones, or those that an installed package provides."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Protocol
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from importlib.metadata import entry_points
+from typing import Any, Protocol
 
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
 from phototaxis.messages import World
+from phototaxis.words import known
 
 from phototaxis_sensors.crowd import CrowdSuite
+from phototaxis_sensors.many import SuiteOfMany
 from phototaxis_sensors.scene import Scene
-from phototaxis_sensors.suite import Models, built_in
+from phototaxis_sensors.suite import Models, SensorSuite, Suite, built_in
+
+GROUP = "phototaxis.sensors"
+"""Entry points of packages that provide sensor models."""
 
 
 class Choice(Protocol):
@@ -39,6 +45,31 @@ class BuiltInChoice:
         return CrowdSuite(world)
 
 
+class Provided(Choice, Protocol):
+    """The sensors of a provider, which hold processes or other things of the machine until they are closed."""
+
+    def try_out(self) -> None:
+        """Load what the options name, so that what is wrong with it is said before a run; `UserError` then."""
+        ...
+
+    def close(self) -> None: ...
+
+
+def make_suite(choice: Choice, world: World) -> Suite[Any, Any]:
+    """The suite of a world.
+
+    Raises
+    ------
+    UserError
+        when the models remember and there are many robots, whose episodes begin at different ticks.
+    """
+    if world.robots == 1:
+        return SensorSuite(world, choice)
+    if choice.remembers:
+        raise UserError(f"an FMU senses for one robot; this world has {world.robots}: start it without --robots")
+    return SuiteOfMany(choice.crowd(world, world.robots), world.robots)
+
+
 @contextmanager
 def choose(options: FmuOptions, one_cpu: bool = False) -> Iterator[Choice]:
     """The built-in models, or FMUs, each of which is loaded once to see that it works.
@@ -48,19 +79,31 @@ def choose(options: FmuOptions, one_cpu: bool = False) -> Iterator[Choice]:
     Raises
     ------
     UserError
-        when an FMU cannot be used, an option does not fit it, or fmpy is not installed.
+        when an FMU cannot be used, an option does not fit it, or what runs FMUs is not installed.
     """
     if options == FmuOptions():
         yield BuiltInChoice()
         return
-    try:
-        from phototaxis_sensors.fmu.sensors import FmuSensors
-    except ModuleNotFoundError as error:
-        line = f"an FMU needs the package {error.name}; install it with: pip install 'phototaxis[sensors,fmu]'"
-        raise UserError(line) from None
-    models = FmuSensors(options, one_cpu)
-    models.try_out()
-    try:
+    with closing(provider("fmu")(options, one_cpu)) as models:
+        models.try_out()
         yield models
-    finally:
-        models.close()
+
+
+def provider(name: str) -> Callable[[FmuOptions, bool], Provided]:
+    """What makes the sensor models of an installed package, by the name of its entry point.
+
+    Raises
+    ------
+    UserError
+        when no such package is installed, or one that it needs is missing.
+    """
+    points = {point.name: point for point in entry_points(group=GROUP)}
+    if name not in points:
+        raise UserError(f"no installed package provides sensor models of the kind '{name}'; {known(name, points)}")
+    try:
+        return points[name].load()
+    except ModuleNotFoundError as error:
+        raise UserError(
+            f"sensor models of the kind '{name}' need the package {error.name}; install it with: "
+            f"pip install 'phototaxis[{name}]'"
+        ) from None

@@ -1,26 +1,23 @@
 """The sensor suites of many robots on the bus: from the columns of a state to those of readings."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from phototaxis.columns import FLAG, pack, unpack
-from phototaxis.errors import UserError
-from phototaxis.messages import ReadingsOfMany, StateOfMany, World
+from phototaxis.messages import ReadingsOfMany, StateOfMany
 
-from phototaxis_sensors.choice import Choice
+from phototaxis_sensors.crowd import CrowdSuite
+from phototaxis_sensors.model import BuiltIn, Moment
 
 
 class SuiteOfMany:
-    """Readings as a pure function of (world, state).
+    """Readings of N robots as a pure function of (world, state); `suite` casts their rays."""
 
-    Raises
-    ------
-    UserError
-        when the models remember: the robots' episodes begin at different ticks.
-    """
+    remembers = False
+    names = BuiltIn.name, BuiltIn.name
 
-    def __init__(self, world: World, choice: Choice):
-        if choice.remembers:
-            raise UserError(f"an FMU senses for one robot; this world has {world.robots}: start it without --robots")
-        self._robots, self._suite = world.robots, choice.crowd(world, world.robots)
+    def __init__(self, suite: CrowdSuite, robots: int):
+        self._suite, self._robots = suite, robots
 
     def __call__(self, state: StateOfMany) -> ReadingsOfMany:
         """Answer one tick.
@@ -38,3 +35,14 @@ class SuiteOfMany:
             light=pack(light), contact=state.contact, left=state.left, right=state.right, author=state.author,
             driver=state.driver,
         )  # fmt: skip
+
+    def first(self, readings: ReadingsOfMany) -> tuple[list[float], Sequence[float]]:
+        """The ranges and lights of the first robot."""
+        sonar, light = unpack(readings.sonar, self._robots, 16), unpack(readings.light, self._robots, 2)
+        return sonar[:, 0].tolist(), light[:, 0].tolist()
+
+    def follow(self, moment: Moment) -> None:
+        """No-op: the models are pure functions of the pose."""
+
+    def begun_anew(self, tick: int) -> None:
+        """No-op: nothing is lost."""

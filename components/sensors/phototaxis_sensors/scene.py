@@ -2,7 +2,7 @@
 
 import pymunk
 from phototaxis.arena import Arena
-from phototaxis.shapes import static_shapes
+from phototaxis_world.shapes import static_shapes
 
 _ALL = pymunk.ShapeFilter()
 

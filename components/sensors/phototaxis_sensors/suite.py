@@ -1,7 +1,7 @@
 """The sensor suite: everything the robot senses at one tick."""
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol, TypeVar
 
 from phototaxis.arena import Arena
 from phototaxis.messages import Readings, State, World
@@ -11,6 +11,45 @@ from phototaxis_sensors.model import Moment, SensorModel
 from phototaxis_sensors.noise import uniform
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.sonar import SonarModel
+
+StateT = TypeVar("StateT", contravariant=True)
+ReadingsT = TypeVar("ReadingsT")
+
+
+class Suite(Protocol[StateT, ReadingsT]):
+    """The sensors of a world, whether it has one robot or many."""
+
+    @property
+    def remembers(self) -> bool:
+        """Earlier ticks of the episode matter; then each tick is asked once, in order."""
+        ...
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Which models make the ranges and the light at present, for the recording."""
+        ...
+
+    def __call__(self, state: StateT) -> ReadingsT:
+        """Answer one tick.
+
+        Raises
+        ------
+        Refused
+            when the state is not one of this world.
+        """
+        ...
+
+    def first(self, readings: ReadingsT) -> tuple[list[float], Sequence[float]]:
+        """The 16 ranges and 2 lights of the first robot, for the recording."""
+        ...
+
+    def follow(self, moment: Moment) -> None:
+        """Let models that remember know of a moment that has been answered by another suite."""
+        ...
+
+    def begun_anew(self, tick: int) -> None:
+        """Tell models that remember that what was before this tick of an episode is not to be had."""
+        ...
 
 
 class Models(NamedTuple):
@@ -38,12 +77,18 @@ class SensorSuite:
     def __init__(self, world: World, make: Make = built_in):
         arena = world.arena
         self._seed, self._noise, self._range = world.seed, arena.sensing.noise, arena.robot.sonar_range
-        self.models = make(arena, Scene(arena))
+        self._models = make(arena, Scene(arena))
+        self.remembers = any(model.remembers for model in self._models)
+
+    @property
+    def names(self) -> tuple[str, str]:
+        sonar, light = self._models
+        return sonar.name, light.name
 
     def __call__(self, state: State) -> Readings:
         """Answer one tick."""
-        sonar = list(self.models.sonar(state))
-        left, right = self.models.light(state)
+        sonar = list(self._models.sonar(state))
+        left, right = self._models.light(state)
         if self._noise:
             factors = (1 + self._noise * uniform(self._seed, state.tick, 18)).tolist()
             most = self._range
@@ -57,5 +102,14 @@ class SensorSuite:
 
     def follow(self, moment: Moment) -> None:
         """Let models that remember know of a moment that has been answered by another suite."""
-        for model in self.models:
+        for model in self._models:
             model(moment)
+
+    def begun_anew(self, tick: int) -> None:
+        """Tell models that remember that what was before this tick of an episode is not to be had."""
+        for model in self._models:
+            model.begun_anew(tick)
+
+    def first(self, readings: Readings) -> tuple[list[float], Sequence[float]]:
+        """The ranges and lights of the robot."""
+        return readings.sonar, readings.light

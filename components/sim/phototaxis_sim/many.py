@@ -163,27 +163,15 @@ class SimulationOfMany:
         )
 
     def _report(self, author: str) -> StateOfMany:
-        left, right = self._motors
-        columns = {
-            "episode": pack(self.episode, COUNT),
-            "pose": pack(self.poses.T),
-            "contact": pack(np.stack([self.front, self.rear]), FLAG),
-            "left": pack(left),
-            "right": pack(right),
-        }
+        episode, pose = pack(self.episode, COUNT), pack(self.poses.T)
+        contact, (left, right) = pack(np.stack([self.front, self.rear]), FLAG), map(pack, self._motors)
         digest = hashlib.blake2b(self._chain, digest_size=8)
-        for column in (pack(np.array([self.tick, self.epoch]), COUNT), *columns.values()):
+        for column in (pack(np.array([self.tick, self.epoch]), COUNT), episode, pose, contact, left, right):
             digest.update(column)
         self._chain = digest.digest()
         seconds = self.tick * self.world.arena.motion.control_period
         self.state = StateOfMany(
-            run=self.world.run,
-            tick=self.tick,
-            epoch=self.epoch,
-            time=seconds,
-            **columns,
-            author=author,
-            driver="",
-            hash=digest.hexdigest(),
-        )
+            run=self.world.run, tick=self.tick, epoch=self.epoch, time=seconds, episode=episode, pose=pose,
+            contact=contact, left=left, right=right, author=author, driver="", hash=digest.hexdigest(),
+        )  # fmt: skip
         return self.state

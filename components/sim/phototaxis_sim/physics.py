@@ -13,8 +13,8 @@ import numpy as np
 import pymunk
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError
-from phototaxis.shapes import static_shapes
 from phototaxis.strides import deepest, furthest, strides
+from phototaxis_world.shapes import static_shapes
 
 _ROBOT = 1
 _FAR = -100_000.0

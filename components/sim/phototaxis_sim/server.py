@@ -9,12 +9,13 @@ from collections import deque
 from typing import Any
 
 import msgspec
-from phototaxis.bus import Bus, Event
+from phototaxis.bus import Bus
 from phototaxis.chunks import Chunks
 from phototaxis.codec import Refused
 from phototaxis.disk import unwritten
 from phototaxis.errors import Unavailable, UserError, warn
 from phototaxis.journal import GIVEN_UP, Journal
+from phototaxis.machine import Event
 from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, Phase, Recorded, SimLog, State, Status
 from phototaxis.protocol import Question
 
@@ -393,9 +394,9 @@ class Server:
             self._logged = s.driver
         contact = s.front + 2 * s.rear
         row = (s.tick, s.episode, s.time, s.x, s.y, s.heading, s.left, s.right, contact)
-        self._log.add(row, time.monotonic())
+        self._log.add((), row, time.monotonic())
 
-    def _chunk(self, seq: int, columns: list[Any]) -> SimLog:
+    def _chunk(self, seq: int, _: tuple[Any, ...], columns: list[Any]) -> SimLog:
         ended, self._ended = self._ended, []
         tick, episode, seconds, x, y, heading, left, right, contact = columns
         return SimLog(

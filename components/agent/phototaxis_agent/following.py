@@ -1,0 +1,102 @@
+"""Whom a waiting agent follows, what it asks of that one, and how it becomes its equal."""
+
+import math
+from typing import Literal
+
+from phototaxis.checkpoint import decode, encode
+from phototaxis.errors import UserError
+from phototaxis.machine import Answer, Ask, Effect, Say
+from phototaxis.messages import CheckpointReply, CheckpointRequest, Readings, ReadingsOfMany
+
+from phototaxis_agent.answering import Answerer
+
+INHERIT_WITHIN_S = 4.0
+"""How long a predecessor gets to hand over what it knows; so long we wait before we ask it again."""
+TAG = "inherit"
+
+Outcome = Literal["same kind", "another kind", "inherited", "nothing"]
+"""What came of a question: the first two of a probe, the others of the question for everything."""
+
+
+class Following:
+    """The agent that drives in one run, as one that waits for its seat sees it.
+
+    Attributes
+    ----------
+    leader : the driver that is followed, once a command of it was applied: it has nothing to ask of us any more.
+    predecessor : the driver that was seen last.
+    related : whether the leader has the same learner and percept.
+    """
+
+    def __init__(self, run: str, agent: Answerer):
+        self._run, self._agent = run, agent
+        self.leader = self.predecessor = ""
+        self.related = False
+        self._asked: Ask | None = None
+        self._probe = False
+        self._retry_at = -math.inf
+
+    @property
+    def probes(self) -> bool:
+        """Whether the leader is being asked what kind it is."""
+        return self._asked is not None and self._probe
+
+    @property
+    def inherits(self) -> bool:
+        """Whether an agent is being asked for everything that it knows."""
+        return self._asked is not None and not self._probe
+
+    def see(self, readings: Readings | ReadingsOfMany) -> bool:
+        """Note who drives; whether there is a new leader."""
+        self.predecessor = readings.driver
+        fresh = readings.driver != self.leader and readings.author == readings.driver
+        self.leader = readings.driver if fresh else self.leader
+        return fresh
+
+    def due(self, now: float) -> bool:
+        """Whether the leader's state is worth asking for."""
+        return self.related and now >= self._retry_at
+
+    def ask(self, whom: str, now: float, probe: bool = False) -> list[Effect]:
+        """Ask an agent for its checkpoint; with `probe` only whether it would fit."""
+        request = CheckpointRequest(agent=whom, learner=self._agent.name, percept=self._agent.task.percept, probe=probe)
+        tag = f"{TAG} {self._run} {whom} {now}"
+        self._asked, self._probe = Ask(tag, "checkpoint", request, INHERIT_WITHIN_S, agent=whom), probe
+        return [self._asked]
+
+    def answered(self, answer: Answer, now: float) -> tuple[Outcome | None, list[Effect]]:
+        """What an answer brings; None when it belongs to an earlier question or another run."""
+        asked, reply = self._asked, answer.first
+        if asked is None or answer.tag != asked.tag:
+            return None, []
+        self._asked = None
+        if self._probe:
+            self.related = reply is not None and not reply.reason
+            return "same kind" if self.related else "another kind", []
+        fault = self._inherit(reply, asked.agent)
+        if fault is None:
+            return "inherited", [Say(f"inherited what {asked.agent} knew at tick {self._agent.tick[1]}")]
+        self._retry_at = now + INHERIT_WITHIN_S
+        return "nothing", [Say(fault)]
+
+    def _inherit(self, reply: CheckpointReply | None, source: str) -> str | None:
+        """Become what the other one is; why not, in a line."""
+        if reply is None or reply.reason:
+            return f"inherited nothing: {source} {'does not answer' if reply is None else reply.reason}"
+        try:
+            meta, arrays = decode(reply.data, source)
+            if meta.run != self._run:
+                return f"inherited nothing: {source} has not driven in this run"
+            self._agent.restore(meta, arrays, source)
+        except UserError as error:
+            return str(error)
+        return None
+
+
+def bequest(agent: Answerer | None, request: CheckpointRequest) -> CheckpointReply:
+    """What a successor is told: all that it needs to continue, or why that does not fit."""
+    if agent is None:
+        return CheckpointReply(reason="knows nothing yet")
+    if (request.learner, request.percept) != (agent.name, agent.task.percept):
+        return CheckpointReply(reason=f"is {agent.name} with the percept {agent.task.percept}")
+    return CheckpointReply() if request.probe else CheckpointReply(data=encode(*agent.checkpoint()))

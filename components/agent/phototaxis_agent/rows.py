@@ -1,0 +1,38 @@
+"""What an agent tells the recording: a row for each tick, and now and then all its values."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from phototaxis.machine import Record
+from phototaxis.messages import AgentLog
+
+from phototaxis_agent.answering import Answerer
+
+TABLE_EVERY_S = 0.5
+
+
+def row(agent: Answerer) -> Record:
+    """What the newest tick was for the agent."""
+    run, tick = agent.tick
+    return Record((agent, run), (tick, *agent.last))
+
+
+class AgentLogs:
+    """Makes the chunks of the agent's log."""
+
+    def __init__(self, ident: str, clock: Callable[[], float] = time.monotonic):
+        self._ident, self._clock, self._table_at = ident, clock, 0.0
+
+    def __call__(self, seq: int, head: tuple[Any, ...], columns: list[tuple[Any, ...]]) -> AgentLog:
+        agent, run = head
+        tick, state, action, reward, error, temperature = map(list, columns)
+        log = AgentLog(
+            run=run, seq=seq, writer=self._ident, learner=agent.name, percept=agent.task.percept,
+            tick=tick, state=state, action=action, reward=reward, td_error=error, temperature=temperature,
+        )  # fmt: skip
+        now = self._clock()
+        if now >= self._table_at:
+            self._table_at = now + TABLE_EVERY_S
+            log.values, log.visits, log.current = agent.table(), list(agent.visits), agent.current()
+        return log

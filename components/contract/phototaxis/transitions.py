@@ -1,0 +1,46 @@
+"""A machine's states: one table says which input leads from which state to which."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Generic, TypeVar
+
+StateT = TypeVar("StateT", bound=StrEnum)
+InputT = TypeVar("InputT", bound=StrEnum)
+
+
+class Transitions(Generic[StateT, InputT]):
+    """The state of one machine, which changes by the rows of its table alone.
+
+    Parameters
+    ----------
+    table : for each state and input that may meet, the next state.
+    state : the first state.
+    """
+
+    def __init__(self, table: Mapping[tuple[StateT, InputT], StateT], state: StateT):
+        self._table, self.state = table, state
+
+    def take(self, given: InputT) -> StateT:
+        """Go on by one input; the new state.
+
+        Raises
+        ------
+        KeyError
+            when the table has no row for it: a defect of the machine.
+        """
+        self.state = self._table[self.state, given]
+        return self.state
+
+
+def diagram(table: Mapping[tuple[StateT, InputT], StateT]) -> str:
+    """The table as a Mermaid state diagram; inputs that lead from one state to the same next one share an arrow."""
+    arrows: dict[tuple[StateT, StateT], list[str]] = {}
+    for (state, given), after in table.items():
+        if after != state:
+            arrows.setdefault((state, after), []).append(given.value)
+    lines = [f"    {_word(a)} --> {_word(b)}: {', '.join(inputs)}" for (a, b), inputs in arrows.items()]
+    return "\n".join(["```mermaid", "stateDiagram-v2", *lines, "```"])
+
+
+def _word(state: StrEnum) -> str:
+    return state.value.replace(" ", "_")

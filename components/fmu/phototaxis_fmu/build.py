@@ -1,0 +1,198 @@
+"""Makes FMUs: a model in C with its description, as sources, and the library for this machine from them."""
+
+import os
+import shutil
+import subprocess
+import sys
+import uuid
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal
+
+from phototaxis.disk import try_file, write_whole
+from phototaxis.errors import UserError
+
+from phototaxis_fmu.examples import FOLDER, Example, Variable
+
+Version = Literal[2, 3]
+PLAIN_NAMES = [f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX" for version in (2, 3)]
+"""What the standard's headers want to hear when sources with a prefix of their own become a library."""
+UNITS = {"m": {"m": "1"}, "rad": {"rad": "1"}, "s": {"s": "1"}, "1": {}}
+
+
+def build(example: Example, version: Version, file: Path, sources_only: bool = False) -> None:
+    """Write an FMU of an example for FMI 2.0 or 3.0; without `sources_only` it holds this machine's library.
+
+    Raises
+    ------
+    UserError
+        when the file cannot be written, or there is no C compiler.
+    """
+    try_file(file, "--output")
+    with TemporaryDirectory(prefix="phototaxis-fmu-") as folder:
+        tree = Path(folder) / "fmu"
+        sources = tree / "sources"
+        sources.mkdir(parents=True)
+        for name in (example.folder / f"{example.name}.c", FOLDER / f"fmi{version}.c", FOLDER / "model.h"):
+            shutil.copy(name, sources)
+        token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'phototaxis/fmu/{example.name}/{version}')}}}"
+        (sources / "names.h").write_text(_names(example))
+        (sources / "variables.h").write_text(_variables(example, token))
+        _write(tree / "modelDescription.xml", (_fmi2 if version == 2 else _fmi3)(example, token))
+        if version == 3:
+            _write(sources / "buildDescription.xml", _recipe(example))
+        archive = Path(shutil.make_archive(str(Path(folder) / "packed"), "zip", tree))
+        if not sources_only:
+            compile_sources(archive)
+        write_whole(file, archive.read_bytes())
+
+
+def compiled(file: Path) -> bytes:
+    """An FMU file with the library for this machine, made from its sources.
+
+    Raises
+    ------
+    UserError
+        as in `compile_sources`.
+    """
+    with TemporaryDirectory(prefix="phototaxis-fmu-") as folder:
+        archive = Path(shutil.copyfile(file, Path(folder) / "compiled.fmu"))
+        compile_sources(archive)
+        return archive.read_bytes()
+
+
+def compile_sources(archive: Path) -> None:
+    """Add the library for this machine, made from its sources, to an FMU file.
+
+    Raises
+    ------
+    UserError
+        when the C compiler is missing or does not accept the sources.
+    """
+    beside = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])  # cmake is there
+    flags = {name: " ".join([os.environ.get(name, ""), *PLAIN_NAMES]).strip() for name in ("CFLAGS", "CXXFLAGS")}
+    command = [sys.executable, "-m", "fmpy", "compile", archive, "--generator", "Unix Makefiles"]
+    environment = os.environ | flags | {"PATH": beside}
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False, env=environment)
+    if done.returncode:
+        lines = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+        said = [line for line in lines if "error" in line.lower()] or lines[-1:] or ["no reason given"]
+        raise UserError(f"the C sources do not compile: {said[0]} (needs gcc and make)")
+
+
+def _names(example: Example) -> str:
+    """names.h, for the model alone: `m->v[0]` is the time, the others follow."""
+    lines = ['#include "model.h"', ""]
+    for variable, reference in _references(example):
+        place = f"m->v + {reference}" if variable.size > 1 else f"m->v[{reference}]"
+        lines.append(f"#define {variable.name} ({place})")
+    return "\n".join(lines) + "\n"
+
+
+def _variables(example: Example, token: str) -> str:
+    """variables.h, for the wrapper."""
+    starts, sizes = ["0"], ["1"]
+    for variable, _ in _references(example):
+        starts += [repr(variable.start or 0.0)] * variable.size
+        sizes += [str(variable.size), *["0"] * (variable.size - 1)]
+    lines = [f'#define TOKEN "{token}"', f"#define VARIABLES {len(starts)}"]
+    lines += [f"#define {name} {{{', '.join(values)}}}" for name, values in (("STARTS", starts), ("SIZES", sizes))]
+    return "\n".join(lines) + "\n"
+
+
+def _references(example: Example) -> Iterator[tuple[Variable, int]]:
+    reference = 1
+    for variable in example.variables:
+        yield variable, reference
+        reference += variable.size
+
+
+def _description(example: Example, version: str, **more: str) -> ET.Element:
+    given = {"fmiVersion": version, "modelName": example.name, "description": example.about}
+    more |= {"generationTool": "phototaxis", "variableNamingConvention": "structured"}
+    return ET.Element("fmiModelDescription", given | more)
+
+
+def _interface(example: Example, state: str) -> dict[str, str]:
+    abilities = {"canHandleVariableCommunicationStepSize": "true", f"canGetAndSet{state}": "true"}
+    return {"modelIdentifier": example.name} | abilities
+
+
+def _units(root: ET.Element) -> None:
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for name, base in UNITS.items():
+        ET.SubElement(ET.SubElement(definitions, "Unit", name=name), "BaseUnit", base)
+
+
+def _attributes(variable: Variable) -> dict[str, str]:
+    given = {"start": variable.start, "min": variable.low, "max": variable.high}
+    found = {name: repr(value) for name, value in given.items() if value is not None}
+    return found | ({"unit": variable.unit} if variable.unit else {})
+
+
+def _fmi2(example: Example, token: str) -> ET.Element:
+    """An array becomes scalars NAME[1], NAME[2], …."""
+    root = _description(example, "2.0", guid=token)
+    interface = ET.SubElement(root, "CoSimulation", _interface(example, "FMUstate"))
+    files = ET.SubElement(interface, "SourceFiles")
+    for name in (f"{example.name}.c", "fmi2.c"):
+        ET.SubElement(files, "File", name=name)
+    _units(root)
+    variables, outputs = ET.SubElement(root, "ModelVariables"), []
+    for variable, reference in _references(example):
+        for number in range(variable.size):
+            name = f"{variable.name}[{number + 1}]" if variable.size > 1 else variable.name
+            one = ET.SubElement(variables, "ScalarVariable", name=name, valueReference=str(reference + number))
+            one.attrib |= {"causality": variable.causality, "description": variable.about}
+            if variable.causality == "parameter":
+                one.attrib |= {"variability": "tunable"}
+            ET.SubElement(one, "Real", _attributes(variable))
+            if variable.causality == "output":
+                outputs.append(str(len(variables)))
+    structure = ET.SubElement(root, "ModelStructure")
+    for part in ("Outputs", "InitialUnknowns"):
+        element = ET.SubElement(structure, part)
+        for index in outputs:
+            ET.SubElement(element, "Unknown", index=index)
+    return root
+
+
+def _fmi3(example: Example, token: str) -> ET.Element:
+    root = _description(example, "3.0", instantiationToken=token)
+    ET.SubElement(root, "CoSimulation", _interface(example, "FMUState"))
+    _units(root)
+    variables, structure = ET.SubElement(root, "ModelVariables"), ET.SubElement(root, "ModelStructure")
+    ET.SubElement(
+        variables, "Float64", name="time", valueReference="0", causality="independent", variability="continuous"
+    )
+    unknown: list[str] = []
+    for variable, reference in _references(example):
+        one = ET.SubElement(variables, "Float64", name=variable.name, valueReference=str(reference))
+        one.attrib |= {"causality": variable.causality, "description": variable.about, **_attributes(variable)}
+        if variable.causality == "parameter":
+            one.attrib |= {"variability": "tunable"}
+        if variable.size > 1:
+            ET.SubElement(one, "Dimension", start=str(variable.size))
+            if variable.start is not None:
+                one.attrib["start"] = " ".join([repr(variable.start)] * variable.size)
+        if variable.causality == "output":
+            unknown.append(str(reference))
+    for kind in ("Output", "InitialUnknown"):
+        for reference in unknown:
+            ET.SubElement(structure, kind, valueReference=reference)
+    return root
+
+
+def _recipe(example: Example) -> ET.Element:
+    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+    files = ET.SubElement(ET.SubElement(root, "BuildConfiguration", modelIdentifier=example.name), "SourceFileSet")
+    for name in (f"{example.name}.c", "fmi3.c"):
+        ET.SubElement(files, "SourceFile", name=name)
+    return root
+
+
+def _write(file: Path, root: ET.Element) -> None:
+    ET.indent(root)
+    ET.ElementTree(root).write(file, encoding="UTF-8", xml_declaration=True)

@@ -1,0 +1,189 @@
+"""An FMU as a sensor model: stepped once a tick, begun anew with each episode, restarted when it fails."""
+
+import math
+import sys
+import time
+from collections import deque
+from collections.abc import Sequence
+from itertools import cycle
+from typing import NamedTuple
+
+from phototaxis.errors import ComponentFailed
+from phototaxis_sensors.model import BuiltIn, Moment, SensorModel
+
+from phototaxis_fmu.host import Failed, Host, Team
+from phototaxis_fmu.rigs import Rig
+from phototaxis_fmu.start import bounds
+from phototaxis_fmu.wiring import Wire, Wiring, size
+
+RESTARTS, WITHIN = 3, 60.0
+"""An FMU that fails more than so many times within so many seconds keeps failing."""
+ROUNDING = 1e-6
+"""What an output may be beyond its limits, relative to them: enough for sums in single precision."""
+LARGEST = sys.float_info.max
+REMEMBERED = 100_000
+"""Ticks of an episode that are kept to bring a restarted FMU to the present."""
+
+
+class Step(NamedTuple):
+    """What the FMU was given at one tick."""
+
+    periods: int
+    """Periods since the tick before; more than 1 where ticks were missed."""
+    inputs: list[float]
+
+
+class Stepped:
+    """Instances of an FMU that go through an episode together, whatever happens to their process.
+
+    Parameters
+    ----------
+    host : runs them.
+    wiring : how one of them is connected.
+    in_time : seconds that a tick may take before it is called slow.
+    label : names it in messages, as in "light FMU lag.fmu".
+    fallback : give it up when it keeps failing; otherwise that is an error.
+
+    Attributes
+    ----------
+    failed : it has been given up.
+    """
+
+    def __init__(self, host: Host | Team, wiring: Wiring, in_time: float, label: str, fallback: bool):
+        self.label, self._host, self._fallback, self.failed = label, host, fallback, False
+        self._in_time = in_time
+        self._episode, self._tick = -1, -1
+        self._steps: deque[Step] = deque(maxlen=REMEMBERED)
+        self._failures: deque[float] = deque(maxlen=RESTARTS + 1)
+        outputs = self._outputs = [wire for wire in wiring.outputs for _ in range(size(wire))]
+        self._limits = [_limits(wire) for wire in outputs]
+        self._plain = all((wire.factor, wire.offset) == (1, 0) for wire in outputs)
+        self.anew = -1
+        """Tick at which it had to forget the earlier part of an episode; −1: never."""
+
+    def __call__(self, episode: int, tick: int, inputs: list[float]) -> Sequence[float] | None:
+        """Outputs of all instances, in our units; None when it has been given up.
+
+        Raises
+        ------
+        ComponentFailed
+            when it keeps failing and there is no fallback.
+        """
+        if self.failed:
+            return None
+        fresh = episode != self._episode
+        if fresh:
+            self._steps.clear()
+        step = Step(1 if fresh else tick - self._tick, inputs)
+        self._steps.append(step)
+        self._episode, self._tick = episode, tick
+        try:
+            if fresh:
+                self._host.begin(inputs)
+            began = time.monotonic()
+            outputs = self._checked(self._host.step(inputs, step.periods))
+            if (seconds := time.monotonic() - began) > self._in_time * step.periods:
+                self._slow(seconds / step.periods)
+        except Failed as why:
+            outputs = self._again(why)
+        if outputs is None or self._plain:
+            return outputs
+        return [(value - wire.offset) / wire.factor for value, wire in zip(outputs, cycle(self._outputs), strict=False)]
+
+    def _slow(self, seconds: float) -> None:
+        """Say once that it cannot keep up with real time."""
+        line = f"took {seconds:.2g} s for tick {self._tick}; in real time a tick lasts {self._in_time:g} s"
+        print(f"sensors: {self.label}: {line}", file=sys.stderr, flush=True)
+        self._in_time = math.inf
+
+    def _again(self, why: Failed) -> Sequence[float] | None:
+        """Restart it and lead it through the episode again, or give it up."""
+        while True:
+            self._failures.append(time.monotonic())
+            line = f"{self.label}: {why} at tick {self._tick}"
+            if len(self._failures) > RESTARTS and self._failures[-1] - self._failures[0] < WITHIN:
+                self._host.stop()
+                line = f"{line}, after {RESTARTS} restarts"
+                if not self._fallback:
+                    raise ComponentFailed(line)
+                print(f"sensors: {line}; the built-in model takes its place", file=sys.stderr, flush=True)
+                self.failed = True
+                return None
+            print(f"sensors: {line}; restarted", file=sys.stderr, flush=True)
+            if len(self._steps) == REMEMBERED:
+                self.anew = self._tick
+            try:
+                self._host.start(logging=True)
+                self._host.begin(self._steps[0].inputs)
+                outputs: Sequence[float] = ()
+                for step in self._steps:
+                    outputs = self._host.step(step.inputs, step.periods)
+                return self._checked(outputs)
+            except Failed as error:
+                why = error
+
+    def _checked(self, outputs: Sequence[float]) -> Sequence[float]:
+        """The outputs; what is beyond its limits by rounding alone is put back to them."""
+        for value, (low, high) in zip(outputs, cycle(self._limits), strict=False):
+            if not low <= value <= high:  # neither is NaN
+                return self._clipped(outputs)
+        return outputs
+
+    def _clipped(self, outputs: Sequence[float]) -> Sequence[float]:
+        clipped = []
+        for value, (low, high), wire in zip(outputs, cycle(self._limits), cycle(self._outputs), strict=False):
+            if not low - _rounding(low, wire) <= value <= high + _rounding(high, wire):
+                self._host.stop()
+                raise Failed(f"its {wire.variable.name} is {value:g}, {_words(low, high)}")
+            clipped.append(min(max(value, low), high))
+        return clipped
+
+
+def _limits(wire: Wire) -> tuple[float, float]:
+    """What an output may be, in its own unit: as declared, and finite."""
+    low, high = bounds(wire.variable)
+    return max(low, -LARGEST), min(high, LARGEST)
+
+
+def _rounding(limit: float, wire: Wire) -> float:
+    """How far beyond a limit is rounding: relative to the limit, or to one of our units where it is 0."""
+    return ROUNDING * max(abs(limit), abs(wire.factor)) if abs(limit) < LARGEST else 0.0
+
+
+def _words(low: float, high: float) -> str:
+    if (low, high) == (-LARGEST, LARGEST):
+        return "not a finite number"
+    if high == LARGEST:
+        return f"below {low:g}"
+    return f"above {high:g}" if low == -LARGEST else f"not in {low:g} to {high:g}"
+
+
+class FmuModel:
+    """A sensor model that is an FMU.
+
+    Parameters
+    ----------
+    stepped : its instances.
+    rig : what the instances are given, and what becomes of their outputs.
+    builtin : takes its place when it has been given up.
+    """
+
+    def __init__(self, stepped: Stepped, rig: Rig, builtin: SensorModel, name: str):
+        self._stepped, self._rig, self._builtin, self._name = stepped, rig, builtin, name
+
+    remembers = True
+
+    @property
+    def name(self) -> str:
+        if self._stepped.failed:
+            return f"{BuiltIn.name}, as {self._name} failed"
+        anew = self._stepped.anew
+        return self._name if anew < 0 else f"{self._name}, its state begun anew at tick {anew}"
+
+    def begun_anew(self, tick: int) -> None:
+        """Say that what was before this tick of the episode is not known to it."""
+        self._stepped.anew = tick
+
+    def __call__(self, moment: Moment) -> Sequence[float]:
+        outputs = self._stepped(moment.episode, moment.tick, self._rig.feed(moment))
+        return self._builtin(moment) if outputs is None else self._rig.collect(outputs)

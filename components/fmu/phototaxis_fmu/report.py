@@ -1,0 +1,130 @@
+"""What is to be said of an FMU: its variables and connections, and how it does when it is driven about."""
+
+import math
+import random
+import time
+from typing import Any
+
+from phototaxis.arena import Arena, Light
+from phototaxis.errors import UserError
+from phototaxis_sensors.model import Past, SensorModel
+from phototaxis_sensors.scene import Scene
+
+from phototaxis_fmu.description import Fmu
+from phototaxis_fmu.sensors import FmuSensors
+from phototaxis_fmu.start import bounds
+from phototaxis_fmu.wiring import SUITES, Suite, connect, declared_unit
+
+EPISODE, EPISODES = 50, 4
+"""Ticks and episodes of a dry run; each episode is gone through twice."""
+
+
+def describe(fmu: Fmu) -> dict[str, Any]:
+    """An FMU as plain data."""
+    description = fmu.description
+    variables = []
+    for one in description.modelVariables:
+        low, high = bounds(one)
+        variables.append(
+            {
+                "name": one.name,
+                "causality": one.causality,
+                "type": one.type,
+                "shape": list(one.shape or ()),
+                "unit": declared_unit(one),
+                "start": one.start,
+                "min": low if math.isfinite(low) else None,
+                "max": high if math.isfinite(high) else None,
+                "description": one.description,
+            }
+        )
+    return {
+        "file": str(fmu.file),
+        "fmi": description.fmiVersion,
+        "model": description.modelName,
+        "description": description.description,
+        "tool": description.generationTool,
+        "platforms": fmu.platforms,
+        "sources": fmu.sources,
+        "runs_here": fmu.compiled,
+        "needs_tool": fmu.interface.needsExecutionTool,
+        "once_per_process": fmu.once,
+        "variables": variables,
+        "as": {kind: connection(fmu, suite) for kind, suite in SUITES.items()},
+    }
+
+
+def connection(fmu: Fmu, suite: Suite) -> dict[str, Any]:
+    """How an FMU would be connected as one kind of sensor, or why not."""
+    try:
+        wiring = connect(fmu, suite, {}, {})
+    except UserError as error:
+        return {"fits": False, "why": str(error).removeprefix(f"{fmu.file}: ")}
+    wires = [*wiring.inputs, *wiring.outputs]
+    return {"fits": True, "wires": [[wire.port, wire.variable.name, wire.factor, wire.offset] for wire in wires]}
+
+
+def text(found: dict[str, Any]) -> str:
+    """What `describe` has found, for a person."""
+    here = "runs here" if found["runs_here"] else "does not run here as it is"
+    has = ", ".join([*found["platforms"], *(["C sources"] if found["sources"] else [])]) or "nothing"
+    needs = [
+        *(["needs the tool that made it, or its language, at run time"] if found["needs_tool"] else []),
+        *(["one instance a process"] if found["once_per_process"] else []),
+    ]
+    lines = [
+        f"{found['file']}: {found['model']}, FMI {found['fmi']} co-simulation",
+        *([found["description"]] if found["description"] else []),
+        "; ".join([f"has {has}", here, *needs]),
+        "",
+    ]
+    for one in found["variables"]:
+        shape = "".join(f"[{extent}]" for extent in one["shape"])
+        limits = [f"{name} {one[name]:g}" for name in ("min", "max") if one[name] is not None]
+        start = [f"start {one['start']}"] if one["start"] is not None and not shape else []
+        rest = ", ".join([*start, *limits])
+        unit = one["unit"] or "–"
+        row = one["causality"], one["name"] + shape, one["type"], unit, rest, one["description"] or ""
+        lines.append("  {:11} {:16} {:8} {:6} {:24} {}".format(*row))
+    lines.append("")
+    for kind, how in found["as"].items():
+        if not how["fits"]:
+            lines.append(f"as a {kind} sensor: no; {how['why']}")
+            continue
+        wires = []
+        for ours, theirs, factor, offset in how["wires"]:
+            change = "" if (factor, offset) == (1, 0) else f" · {factor:g}" + (f" + {offset:g}" if offset else "")
+            wires.append(f"{theirs} = {ours}{change}")
+        lines.append(f"as a {kind} sensor: {', '.join(wires[:4])}{', …' if len(wires) > 4 else ''}")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def dry_run(sensors: FmuSensors, kind: str) -> dict[str, Any]:
+    """Drive about at random, each episode twice.
+
+    Raises
+    ------
+    UserError
+        when the FMU fails, or the same inputs give other readings after a reset.
+    """
+    arena = Arena("check", (10.0, 10.0), [Light((5.0, 5.0))])
+    model: SensorModel = getattr(sensors(arena, Scene(arena)), kind)
+    chance, readings, spent = random.Random(1), list[float](), 0.0  # noqa: S311 - a drive, no secret
+    for episode in range(EPISODES):
+        ways = [(chance.uniform(1, 9), chance.uniform(1, 9), chance.uniform(-3, 3)) for _ in range(EPISODE)]
+        twice = []
+        for half in range(2):
+            began = time.perf_counter()
+            at = 2 * episode + half
+            twice.append([list(model(Past(at * EPISODE + i, at, *way))) for i, way in enumerate(ways)])
+            spent += time.perf_counter() - began
+        if twice[0] != twice[1]:
+            line = f"after {sensors.begins} the same inputs give other readings: runs with this FMU cannot be repeated"
+            raise UserError(line + (" (unless --fmu-fresh mends it)" if sensors.begins == "a reset" else ""))
+        readings += [value for one in twice[0] for value in one]
+    ticks = 2 * EPISODE * EPISODES
+    low, high = min(readings), max(readings)
+    return {
+        "kind": kind, "ticks": ticks, "episodes": 2 * EPISODES, "low": low, "high": high,
+        "microseconds": spent / ticks * 1e6, "begins": sensors.begins,
+    }  # fmt: skip

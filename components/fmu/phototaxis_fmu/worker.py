@@ -1,0 +1,103 @@
+"""The process that foreign code runs in: it loads one FMU and steps its instances for its parent.
+
+Requests come on standard input, answers go to what was standard output; what the FMU prints and logs goes to
+standard error. The first request is a `Setup` in JSON, after its length; each later one a head (`HEAD`: what to do, how
+many periods) and the inputs of all instances, as doubles. An answer is a head (`DONE` and 0) and the outputs; or
+`FAILED`, the length of a text, and the text; `REPLACED` with its text comes before an answer.
+"""
+
+import fcntl
+import os
+import struct
+import sys
+from contextlib import suppress
+
+import msgspec
+
+from phototaxis_fmu.instance import Instance, Setup, Voice, explain
+
+HEAD = struct.Struct("<qq")
+LENGTH = struct.Struct("<q")
+BEGIN, STEP = 1, 2
+APART = 200
+"""Number from which on our pipes are: some FMUs close the first ones, which they think are their own."""
+DONE, FAILED, REPLACED = 0, 1, 2
+
+
+class Worker:
+    """All instances, and the buffers that they share."""
+
+    def __init__(self, setup: Setup, voice: Voice):
+        size_in, size_out = (8 * sum(end.values for end in ends) for ends in (setup.inputs, setup.outputs))
+        self.inputs = bytearray(HEAD.size + size_in * setup.instances)
+        self.outputs = bytearray(HEAD.size + size_out * setup.instances)
+        self._voice = voice
+        self.instances = [
+            Instance(
+                setup, number, (self.inputs, HEAD.size + number * size_in),
+                (self.outputs, HEAD.size + number * size_out), voice,
+            )
+            for number in range(setup.instances)
+        ]  # fmt: skip
+
+    def answer(self) -> str:
+        """Do what the head of the inputs says; why instances were replaced, if any was."""
+        order, count = HEAD.unpack_from(self.inputs)
+        self._voice.forget()
+        replaced = ""
+        for one in self.instances:
+            if order == BEGIN:
+                replaced = one.begin() or replaced
+            else:
+                one.step(count)
+        return replaced
+
+
+def read(source: int, into: memoryview) -> bool:
+    """Fill a buffer; False at the end of the stream."""
+    while into:
+        got = os.readv(source, [into])
+        if not got:
+            return False
+        into = into[got:]
+    return True
+
+
+def serve(source: int, answers: int) -> None:
+    """Answer until the parent closes the stream."""
+    length = bytearray(LENGTH.size)
+    if not read(source, memoryview(length)):
+        return
+    text = bytearray(LENGTH.unpack(length)[0])
+    read(source, memoryview(text))
+    setup = msgspec.json.decode(text, type=Setup)
+    voice = Voice(setup.least)
+    try:
+        worker = Worker(setup, voice)
+        os.write(answers, HEAD.pack(DONE, 0))
+        while read(source, memoryview(worker.inputs)):
+            if replaced := worker.answer():
+                _say(answers, REPLACED, replaced)
+            os.write(answers, worker.outputs)
+        for one in worker.instances:
+            one.end()
+    except Exception as error:  # of whatever kind: the parent tells it
+        with suppress(BrokenPipeError):
+            _say(answers, FAILED, explain(error, voice))
+
+
+def _say(answers: int, kind: int, words: str) -> None:
+    text = words.encode(errors="replace")
+    os.write(answers, HEAD.pack(kind, len(text)) + text)
+
+
+def main() -> None:
+    source, answers = (fcntl.fcntl(pipe, fcntl.F_DUPFD_CLOEXEC, APART) for pipe in (0, 1))
+    os.dup2(2, 1)  # what the FMU prints must not be taken for an answer
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    serve(source, answers)
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

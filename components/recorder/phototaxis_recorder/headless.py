@@ -1,0 +1,93 @@
+"""A Rerun viewer without a display: what it shows, as pictures and as its own words."""
+
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from phototaxis.disk import write_whole
+from phototaxis.errors import ComponentFailed
+from phototaxis.ports import free_ports
+from PIL import Image
+from rerun.experimental import ViewerClient
+
+from phototaxis_recorder.viewer import STARTS_WITHIN_S, rerun_program
+
+SIZE = "1500x900"
+FRAMES_A_SECOND = 4
+ANIMATION_WIDTH = 900
+
+
+@contextmanager
+def viewer(source: str) -> Iterator[Any]:
+    """A viewer of a file or of a `rerun+http://` address, as Rerun's ViewerClient.
+
+    Raises
+    ------
+    ComponentFailed
+        when it does not come up (it needs a Vulkan driver; Mesa's for software rendering will do).
+    """
+    port = str(*free_ports(1))
+    what = ["--connect", source] if source.startswith("rerun+") else [source]
+    words = ["--headless", "--bind", "127.0.0.1", "--port", port, "--window-size", SIZE, *what]
+    with tempfile.TemporaryFile() as said:
+        process = subprocess.Popen([rerun_program(), *words], stdout=said, stderr=said)
+        try:
+            yield _connected(process, port, said)
+        finally:
+            process.terminate()
+            process.wait()
+
+
+def _connected(process: subprocess.Popen[bytes], port: str, said: Any) -> Any:
+    deadline = time.monotonic() + STARTS_WITHIN_S
+    while process.poll() is None and time.monotonic() < deadline:
+        try:
+            client = ViewerClient(f"rerun+http://127.0.0.1:{port}/proxy")
+            client.get_state()
+            return client
+        except Exception:
+            time.sleep(0.1)  # a program that does not say when it can be asked
+    said.seek(0)
+    lines = said.read().decode(errors="replace").strip().splitlines()
+    raise ComponentFailed(
+        "the Rerun viewer does not start without a display; it needs a Vulkan driver "
+        f"(Debian: mesa-vulkan-drivers). Its last words: {lines[-1] if lines else 'none'}"
+    )
+
+
+def shown_tick(client: Any) -> int:
+    """The tick that the viewer shows now, by its own state; −1 while it shows none."""
+    state = client.get_state()
+    for recording in state.recordings:
+        if recording.store_id == state.active_recording and recording.current_timeline == "tick":
+            return -1 if recording.current_time is None else recording.current_time
+    return -1
+
+
+def picture(source: str, target: Path, seconds: float) -> None:
+    """Write what the viewer shows: a .png after `seconds`, or those seconds that follow as a .gif."""
+    with viewer(source) as client, tempfile.TemporaryDirectory() as folder:
+        time.sleep(seconds)  # the moment that is wanted
+        if target.suffix == ".png":
+            file = Path(folder) / "picture.png"
+            client.save_screenshot(str(file))
+            write_whole(target, file.read_bytes())
+            return
+        frames = []
+        for number in range(round(seconds * FRAMES_A_SECOND)):
+            file = Path(folder) / f"{number}.png"
+            began = time.monotonic()
+            client.save_screenshot(str(file))
+            with Image.open(file) as image:
+                height = round(image.height * ANIMATION_WIDTH / image.width)
+                frames.append(image.convert("RGB").resize((ANIMATION_WIDTH, height)).quantize(96))
+            time.sleep(max(began + 1 / FRAMES_A_SECOND - time.monotonic(), 0))  # until the next frame
+        film = BytesIO()
+        duration = 1000 // FRAMES_A_SECOND
+        frames[0].save(film, "GIF", save_all=True, append_images=frames[1:], duration=duration, loop=0)
+        write_whole(target, film.getvalue())

@@ -1,0 +1,128 @@
+"""The page that shows the live view in a browser, and keeps the browser from contacting others."""
+
+import re
+import socketserver
+import subprocess
+import time
+from http.client import HTTPConnection
+from http.server import BaseHTTPRequestHandler
+from threading import Lock, Thread
+from typing import cast
+
+from phototaxis.errors import ComponentFailed
+from phototaxis.ports import free_ports
+
+from phototaxis_recorder.viewer import STARTS_WITHIN_S, rerun_program
+
+FILES = ("/", "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/apple-touch-icon.png")
+"""Everything that the web viewer is made of."""
+ELSEWHERE = re.compile(rb"""<link[^>]*href="https://[^>]*>""")
+"""Hints in the page to connect to others, which a content security policy does not cover."""
+
+
+class ViewerPage(socketserver.ThreadingTCPServer):
+    """Rerun's web viewer, served by threads of this process on one address.
+
+    Left alone it would fetch fonts, report its use and look for updates. The browser is told (by a content security
+    policy) to connect to nothing but this page and recordings on `grpc_port`. The files come from Rerun's own
+    program when the first browser asks for them.
+    """
+
+    allow_reuse_address = daemon_threads = True
+
+    def __init__(self, host: str, port: int, grpc_port: int):
+        super().__init__((host, port), _Handler)
+        self.policy = (
+            "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; "
+            f"connect-src 'self' data: blob: http://localhost:{grpc_port} http://*:{grpc_port}"
+        )
+        self._lock = Lock()
+        self._files: dict[str, tuple[str, bytes]] = {}
+        Thread(target=self.serve_forever, daemon=True).start()
+
+    def file(self, path: str) -> tuple[str, bytes] | None:
+        """Type and content of one of the viewer's files."""
+        with self._lock:
+            self._files = self._files or _viewer_files()
+        return self._files.get(path)
+
+    def close(self) -> None:
+        """Serve no more; the port is free then."""
+        self.shutdown()
+        self.server_close()
+
+
+class _Handler(BaseHTTPRequestHandler):
+    def do_GET(self) -> None:
+        page = cast(ViewerPage, self.server)
+        try:
+            found = page.file(self.path.partition("?")[0])
+        except ComponentFailed as error:
+            self.send_error(502, str(error))
+            return
+        if found is None:
+            self.send_error(404)
+            return
+        kind, content = found
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Content-Security-Policy", page.policy)
+        self.end_headers()
+        try:
+            self.wfile.write(content)
+        except ConnectionError:
+            self.close_connection = True  # the browser has gone elsewhere
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Requests are no news."""
+
+
+def _viewer_files() -> dict[str, tuple[str, bytes]]:
+    """The web viewer's files as Rerun's own program hands them out.
+
+    A shell holds the program by its standard input, and in a session of its own: it ends with this process,
+    however that ends, and Ctrl-C does not part the two.
+    """
+    page, grpc = free_ports(2)
+    program = [
+        rerun_program(),
+        "--serve-web",
+        "--bind",
+        "127.0.0.1",
+        "--web-viewer-port",
+        str(page),
+        "--port",
+        str(grpc),
+    ]
+    process = subprocess.Popen(
+        ["/bin/sh", "-c", '"$@" & cat >/dev/null; kill $!; wait', "page", *program],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        files = {path: _fetch(page, path) for path in FILES}
+        kind, html = files["/"]
+        files["/"] = kind, ELSEWHERE.sub(b"", html)
+        return files
+    finally:
+        process.communicate()
+
+
+def _fetch(port: int, path: str) -> tuple[str, bytes]:
+    """Type and content of a file, from a program that may still be starting."""
+    deadline = time.monotonic() + STARTS_WITHIN_S
+    while True:
+        connection = HTTPConnection("127.0.0.1", port, timeout=STARTS_WITHIN_S)
+        try:
+            connection.request("GET", path)
+            answer = connection.getresponse()
+            return answer.headers["Content-Type"], answer.read()
+        except OSError as error:
+            if time.monotonic() > deadline:
+                raise ComponentFailed(f"Rerun's program does not hand out its web viewer: {error}") from None
+            time.sleep(0.05)
+        finally:
+            connection.close()

@@ -1,0 +1,97 @@
+"""The chunks of one log topic in their order, and the questions for those that are missing.
+
+Logs are dropped under pressure, and recorders come late or are restarted; so each chunk has a number, and who wrote
+it keeps it for a while and is asked for it again.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from phototaxis.machine import Ask, Effect, Own
+from phototaxis.messages import LogRequest
+
+
+class Write(Own):
+    """Add a chunk to the recording."""
+
+    topic: str
+    chunk: Any
+
+
+class LogReader:
+    """One log topic in one run: its chunks come in order, those that follow a gap wait until it has been asked for.
+
+    Attributes
+    ----------
+    newest : the newest tick that was written; −1 for none.
+    heard : when the newest chunk was published.
+    open : the tags of the questions that are not answered yet.
+    """
+
+    def __init__(self, topic: str, run: str, tags: Iterator[int], alive: set[str]):
+        self.topic, self.newest, self.heard, self.open = topic, -1, -math.inf, set[str]()
+        self._run, self._tags, self._alive = run, tags, alive
+        self._writer = ""
+        """Who wrote the newest chunk."""
+        self._expected: dict[str, int] = {}
+        """The number of the next chunk of each writer."""
+        self._held: list[Any] = []
+        """Chunks that came while a question was open."""
+        self._asked: set[str] = set()
+        """Who is asked in the open questions; "" for everybody."""
+        self._found: list[Any] = []
+        """What was answered to questions while others were open."""
+
+    def came(self, chunk: Any, now: float) -> Iterator[Effect]:
+        """A chunk was published."""
+        self.heard = now
+        self._held.append(chunk)
+        yield from self._go_on()
+
+    def answered(self, tag: str, chunks: Iterable[Any]) -> Iterator[Effect]:
+        """A question was answered; when all are, chunks that have not come are lost."""
+        self.open.remove(tag)
+        self._found += chunks
+        if self.open:
+            return
+        found, asked, self._found, self._asked = self._found, self._asked, [], set()
+        for chunk in sorted(found, key=lambda chunk: chunk.tick[0]):
+            yield from self._write(chunk)
+        if self._held:
+            self._writer = self._held[0].writer  # its predecessor has been asked
+            if asked & {"", self._writer}:
+                yield from self._write(self._held.pop(0))
+        yield from self._go_on()
+
+    def ask(self) -> Iterator[Effect]:
+        """Ask the newest writer (everybody, if none is known) for what is missing."""
+        yield from self._ask(self._writer)
+
+    def _go_on(self) -> Iterator[Effect]:
+        """Write the chunks that wait, until one is missing."""
+        while self._held and not self.open:
+            chunk, former = self._held[0], self._writer
+            self._writer = chunk.writer
+            if former not in ("", chunk.writer):
+                yield from self._ask(former)  # what it still has comes before
+            if not self.open and chunk.seq > self._expected.get(chunk.writer, 0):
+                yield from self._ask(chunk.writer)
+            if not self.open:
+                yield from self._write(self._held.pop(0))
+
+    def _ask(self, writer: str) -> Iterator[Effect]:
+        if writer and writer not in self._alive:
+            return
+        tag = f"{self.topic} {next(self._tags)}"
+        self.open.add(tag)
+        self._asked.add(writer)
+        yield Ask(tag, self.topic, LogRequest(seq=self._expected.get(writer, 0), writer=writer), every=True)
+
+    def _write(self, chunk: Any) -> Iterator[Effect]:
+        """A chunk of this run; not one that was written before."""
+        if chunk.run != self._run or chunk.seq < self._expected.get(chunk.writer, 0):
+            return
+        self._writer, self._expected[chunk.writer] = chunk.writer, chunk.seq + 1
+        self.newest = max(self.newest, chunk.tick[-1])
+        yield Write(topic=self.topic, chunk=chunk)

@@ -1,0 +1,13 @@
+"""The arena's static shapes for pymunk, the same for physics and rays (needs the extra world)."""
+
+import pymunk
+from phototaxis.arena import Arena
+
+
+def static_shapes(arena: Arena, body: pymunk.Body) -> list[pymunk.Shape]:
+    """Everything that does not move: the room, polygons, walls and discs."""
+    return [
+        *(pymunk.Poly(body, polygon.corners) for polygon in (*arena.boundary(), *arena.polygons)),
+        *(pymunk.Segment(body, wall.start, wall.end, wall.thickness / 2) for wall in arena.walls),
+        *(pymunk.Circle(body, disc.radius, disc.centre) for disc in arena.discs),
+    ]

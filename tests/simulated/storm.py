@@ -1,0 +1,148 @@
+"""Runs schedules and compares each with the run in one process; a schedule that fails is made as short as it can be.
+
+`make storm SEEDS=0:1000` runs a range of seeds.
+"""
+
+import tempfile
+import time
+from collections import Counter
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import joblib
+import msgspec
+from phototaxis.checkpoint import load
+from phototaxis_agent.setup import make_setup
+from phototaxis_lab.loop import train
+from phototaxis_sim import arenas
+from tqdm import tqdm
+
+from simulated.process import Process
+from simulated.schedule import Fault, Schedule, make
+from simulated.system import BACK_AFTER_S, System
+from simulated.witness import Broken
+
+LIMIT_S = 600.0
+"""Virtual seconds within which every run ends."""
+
+
+@cache
+def reference(world: int, epochs: int) -> tuple[str, str, int]:
+    """State hash, learner hash and ticks of the run in one process."""
+    loop, _ = train(make_setup(), arenas.load("paper"), world, epochs)
+    state = loop.simulation.state
+    return state.hash, loop.agent.checkpoint()[0].learner_hash, state.tick
+
+
+class Storm:
+    """One schedule as it is carried out.
+
+    Attributes
+    ----------
+    counts : faults that happened, by kind, and the messages that were lost, doubled and reordered.
+    """
+
+    def __init__(self, schedule: Schedule, folder: Path):
+        self.counts: Counter[str] = Counter()
+        self._schedule, self._faults = schedule, list(schedule.faults)
+        arena = arenas.load("paper")
+        self._system = System(folder, schedule.seed, arena, make_setup(), schedule.world, schedule.epochs)
+        self._system.network.weather = msgspec.structs.replace(schedule.weather)
+        self._names = ["agent"]
+        self._sensors, self._agent = self._system.sensors(), self._system.agent("agent")
+
+    def run(self) -> int:
+        """Carry it out; the ticks of the run.
+
+        Raises
+        ------
+        Broken
+            when an invariant does not hold, the run does not end, or ends otherwise than in one process.
+        """
+        system, schedule = self._system, self._schedule
+        system.timeline.after(0.001, self._watch)
+        if not system.finish(LIMIT_S):
+            raise Broken(f"the run stands at tick {system.asker.simulation.state.tick} after {LIMIT_S:g} s")
+        state_hash, learner_hash, ticks = reference(schedule.world, schedule.epochs)
+        if system.asker.hashes[-1] != state_hash:
+            raise Broken("the state's hash is another than in one process")
+        if any(author != driver for author, driver in system.asker.applied):
+            raise Broken("a command was applied that was not the driver's")
+        driver = system.names[system.asker.seat.driver or system.asker.applied[-1][0]]
+        if load(system.checkpoint(driver))[0].learner_hash != learner_hash:
+            raise Broken("what was learned is another than in one process")
+        self.counts.update({name: count for name, count in system.network.counts.items() if name != "sent"})
+        return ticks
+
+    def _watch(self) -> None:
+        """Begin the faults whose tick has come, and start again what has died."""
+        system = self._system
+        while self._faults and self._faults[0].tick <= system.asker.simulation.state.tick:
+            self._begin(self._faults.pop(0))
+        if self._sensors.dead:
+            self._sensors = system.sensors()
+        if self._agent.dead and not system.asker.finished:
+            mode = "claim" if len(self._names) == 1 else "take over"
+            self._agent = system.agent(self._names[-1], mode, restarted=True)
+        if not system.asker.finished:
+            system.timeline.after(BACK_AFTER_S if not self._faults else 0.0007, self._watch)
+
+    def _begin(self, fault: Fault) -> None:
+        self.counts[fault.kind] += 1
+        if fault.kind == "swap":
+            agent = self._agent  # one that dies before it hands over takes what it knows with it
+            if not agent.dead and agent.kill_in is None and self._system.asker.seat.driver == agent.ident:
+                self._swap()
+            return
+        process = self._agent if fault.kind.endswith("agent") else self._sensors
+        if fault.kind.startswith("kill"):
+            process.kill_in, process.tear = fault.effects, fault.tear
+        elif not process.dead:
+            process.frozen = True
+            self._system.timeline.after(fault.seconds, process.thaw)
+
+    def _swap(self) -> None:
+        """An agent of the same kind takes over; from now on it is the one that faults befall."""
+        self._names.append(f"agent-{len(self._names) + 1}")
+        self._agent: Process = self._system.agent(self._names[-1], "take over")
+
+
+def run(schedule: Schedule) -> tuple[str, int, Counter[str]]:
+    """What is wrong ("" for nothing), the ticks, and the faults by kind."""
+    with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:  # noqa: S108
+        try:
+            storm = Storm(schedule, Path(folder))
+            return "", storm.run(), storm.counts
+        except Exception as error:
+            return f"{type(error).__name__}: {error}", 0, Counter()
+
+
+def _numbered(seed: int) -> tuple[int, tuple[str, int, Counter[str]]]:
+    return seed, run(make(seed))
+
+
+def shrink(schedule: Schedule) -> Schedule:
+    """The schedule without the faults that it fails without."""
+    for fault in reversed(schedule.faults):
+        fewer = msgspec.structs.replace(schedule, faults=[one for one in schedule.faults if one is not fault])
+        if run(fewer)[0]:
+            schedule = fewer
+    return schedule
+
+
+def main(words: list[str]) -> int:
+    first, _, last = (words[0] if words else "0:200").partition(":")
+    seeds = range(int(first), int(last) if last else int(first) + 1)
+    began, ticks, failed, faults = time.perf_counter(), 0, 0, Counter[str]()
+    parallel: Any = joblib.Parallel  # its stubs know neither numbers for batch_size nor generators
+    work = parallel(n_jobs=-1, batch_size=8, return_as="generator")(joblib.delayed(_numbered)(s) for s in seeds)
+    for seed, (wrong, made, counts) in tqdm(work, total=len(seeds), unit=" schedules"):
+        ticks, faults = ticks + made, faults + counts
+        if wrong:
+            failed += 1
+            print(f"seed {seed}: {wrong}\n  {shrink(make(seed))}", flush=True)
+    seconds = time.perf_counter() - began
+    rate = f"{ticks / seconds:.0f} ticks/s, {len(seeds) / seconds:.1f} schedules/s"
+    print(f"{len(seeds)} schedules, {ticks} ticks, {failed} failed; {rate}; {dict(sorted(faults.items()))}")
+    return 1 if failed else 0

@@ -1,0 +1,62 @@
+"""What must hold at every event, whatever the schedule does."""
+
+from typing import Any
+
+import msgspec
+from phototaxis import machine as m
+from phototaxis.messages import Readings
+from phototaxis_agent.agent import Agent
+
+from simulated.process import Process
+
+
+class Broken(AssertionError):
+    """An invariant does not hold."""
+
+
+class Witness:
+    """Watches the effects of all processes.
+
+    - The answer of a process to a tick never changes.
+    - An agent that keeps a journal has written a tick down before it answers it.
+    - An agent learns from each tick once, and in order.
+    """
+
+    def __init__(self) -> None:
+        self.answers: dict[tuple[str, str, int, str], Any] = {}
+        self._kept: dict[str, int] = {}
+
+    def carried(self, process: Process, effect: m.Effect) -> None:
+        """An effect has been carried out."""
+        if process.role == "agent" and isinstance(effect, m.Append):
+            self._kept[process.ident] = msgspec.msgpack.decode(effect.entry, type=Readings).tick
+        elif process.role == "agent" and isinstance(effect, m.Save):
+            self._kept[process.ident] = max(effect.meta.tick, self._kept.get(process.ident, -1))
+        elif isinstance(effect, m.Publish) and effect.topic in ("readings", "command"):
+            self._answered(process, effect.topic, effect.message)
+
+    def _answered(self, process: Process, topic: str, message: Any) -> None:
+        told = msgspec.structs.replace(message, driver="") if topic == "readings" else message
+        who = "" if topic == "readings" else message.author
+        if self.answers.setdefault((topic, message.run, message.tick, who), told) != told:
+            raise Broken(f"{process.ident} answers tick {message.tick} in another way than before")
+        if topic == "command" and self._kept.get(process.ident, -1) < message.tick:
+            raise Broken(f"{process.ident} answers tick {message.tick} before it is in the journal")
+
+    def restarted(self, ident: str, kept: int) -> None:
+        """A process goes on from a disk that holds its former self's ticks up to `kept`."""
+        self._kept[ident] = kept
+
+
+def watch_learning(agent: Agent) -> Agent:
+    """The same agent, which breaks when it is made to go through a tick a second time."""
+
+    class Watched(type(agent)):
+        def __call__(self, readings: Readings):
+            run, tick = self.tick
+            if run == readings.run and readings.tick <= tick:
+                raise Broken(f"{self.author} learns tick {readings.tick} again, after {tick}")
+            return super().__call__(readings)
+
+    agent.__class__ = Watched
+    return agent
