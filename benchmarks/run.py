@@ -246,51 +246,18 @@ def recorder_cost(arena: Arena, loop: Loop) -> float:
         for first in range(0, ticks, chunk):
             tick, ones = list(range(first, first + chunk)), [1.0] * chunk
             zeros = [0] * chunk
-            translator.sim(
-                SimLog(
-                    run="b",
-                    seq=0,
-                    writer="w",
-                    driver="d",
-                    tick=tick,
-                    episode=zeros,
-                    time=ones,
-                    x=ones,
-                    y=ones,
-                    heading=ones,
-                    left=ones,
-                    right=ones,
-                    contact=zeros,
-                    ended=[],
-                )
-            )
-            translator.sensors(
-                SensorsLog(
-                    run="b",
-                    seq=0,
-                    writer="w",
-                    sonar_model="",
-                    light_model="",
-                    tick=tick,
-                    sonar=[1.0] * 16 * chunk,
-                    light=[0.1] * 2 * chunk,
-                )
-            )
-            translator.agent(
-                AgentLog(
-                    run="b",
-                    seq=0,
-                    writer="w",
-                    learner="qtable",
-                    percept="simple",
-                    tick=tick,
-                    state=zeros,
-                    action=zeros,
-                    reward=ones,
-                    td_error=ones,
-                    temperature=ones,
-                )
-            )
+            translator.sim(SimLog(
+                run="b", seq=0, writer="w", driver="d", tick=tick, episode=zeros, time=ones, x=ones, y=ones,
+                heading=ones, left=ones, right=ones, contact=zeros, ended=[],
+            ))  # fmt: skip
+            translator.sensors(SensorsLog(
+                run="b", seq=0, writer="w", sonar_model="", light_model="", tick=tick, sonar=[1.0] * 16 * chunk,
+                light=[0.1] * 2 * chunk,
+            ))  # fmt: skip
+            translator.agent(AgentLog(
+                run="b", seq=0, writer="w", learner="qtable", percept="simple", tick=tick, state=zeros, action=zeros,
+                reward=ones, td_error=ones, temperature=ones,
+            ))  # fmt: skip
             if first % 400 == 0:
                 translator.flush()
                 recording.keep()

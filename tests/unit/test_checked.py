@@ -121,21 +121,10 @@ def test_numbers_of_other_libraries_are_errors_that_can_be_recorded(make, name):
     last = drive(make(learn=ERRORS[name])).last
     assert type(last.td_error) is float
     number, action, reward, error, heat = last
-    on_the_wire(
-        AgentLog(
-            run="r",
-            seq=0,
-            writer="a",
-            learner="theirs",
-            percept="simple",
-            tick=[3],
-            state=[number],
-            action=[action],
-            reward=[reward],
-            td_error=[error],
-            temperature=[heat],
-        )
-    )
+    on_the_wire(AgentLog(
+        run="r", seq=0, writer="a", learner="theirs", percept="simple", tick=[3], state=[number], action=[action],
+        reward=[reward], td_error=[error], temperature=[heat],
+    ))  # fmt: skip
 
 
 FAULTY_VALUES = {

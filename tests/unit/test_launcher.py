@@ -51,9 +51,8 @@ def test_a_watched_demo_begins_and_ends_slowly(monkeypatch: pytest.MonkeyPatch):
 
     def at(epoch: int, phase: str = "paused", driver: str = "qtable-1", waiting_for: str = "") -> list[str]:
         wire.asked.clear()
-        story.follow(
-            Status(run="r", phase=phase, waiting_for=waiting_for, epoch=epoch, epochs=3000, driver=driver), wire, said
-        )  # pyright: ignore
+        status = Status(run="r", phase=phase, waiting_for=waiting_for, epoch=epoch, epochs=3000, driver=driver)  # pyright: ignore
+        story.follow(status, wire, said)  # pyright: ignore
         return [*wire.asked]
 
     def due() -> bool:

@@ -89,24 +89,10 @@ def test_a_percept_that_nobody_knows_is_recorded_without_a_picture_of_its_states
     recording.save(str(tmp_path / "r.rrd"))
     translator = Translator(recording, World(run="r", arena=paper, seed=0, epochs=0))
     one = [0.5, 0.5]
-    translator.agent(
-        AgentLog(
-            run="r",
-            seq=0,
-            writer="w",
-            learner="mine",
-            percept="camera",
-            tick=[0, 1],
-            state=[0, 0],
-            action=[4, 4],
-            reward=one,
-            td_error=one,
-            temperature=one,
-            values=[1.0] * 7,
-            visits=[1],
-            current=[2.0] * 9,
-        )
-    )
+    translator.agent(AgentLog(
+        run="r", seq=0, writer="w", learner="mine", percept="camera", tick=[0, 1], state=[0, 0], action=[4, 4],
+        reward=one, td_error=one, temperature=one, values=[1.0] * 7, visits=[1], current=[2.0] * 9,
+    ))  # fmt: skip
     translator.flush(last=True)
     recording.disconnect()
     assert sorted(series(tmp_path / "r.rrd", "/plots/reward", "Scalars:scalars")) == [0, 1]
@@ -119,36 +105,14 @@ def test_a_pose_that_nobody_sensed_has_no_rays_of_another(tmp_path: Path, paper:
     recording.save(str(tmp_path / "r.rrd"))
     translator = Translator(recording, World(run="r", arena=paper, seed=0, epochs=0))
     none, place = [0, 0, 0], [1.0, 1.0, 1.0]
-    translator.sim(
-        SimLog(
-            run="r",
-            seq=0,
-            writer="s",
-            driver="",
-            tick=[0, 1, 2],
-            episode=none,
-            time=place,
-            x=place,
-            y=place,
-            heading=place,
-            left=place,
-            right=place,
-            contact=none,
-            ended=[],
-        )
-    )
-    translator.sensors(
-        SensorsLog(
-            run="r",
-            seq=0,
-            writer="s",
-            sonar_model="built-in",
-            light_model="built-in",
-            tick=[0, 1],
-            sonar=[1.0] * 32,
-            light=[0.5] * 4,
-        )
-    )
+    translator.sim(SimLog(
+        run="r", seq=0, writer="s", driver="", tick=[0, 1, 2], episode=none, time=place, x=place, y=place,
+        heading=place, left=place, right=place, contact=none, ended=[],
+    ))  # fmt: skip
+    translator.sensors(SensorsLog(
+        run="r", seq=0, writer="s", sonar_model="built-in", light_model="built-in", tick=[0, 1], sonar=[1.0] * 32,
+        light=[0.5] * 4,
+    ))  # fmt: skip
     translator.flush(last=True)
     recording.disconnect()
     assert sorted(series(tmp_path / "r.rrd", "/world/trail", "Points2D:positions")) == [0, 1, 2]
@@ -160,21 +124,9 @@ def moved(first: int, ticks: int) -> SimLog:
     tick, none = list(range(first, first + ticks)), [0] * ticks
     x, ones = np.random.default_rng(first).uniform(1, 9, ticks).tolist(), [1.0] * ticks
     return SimLog(
-        run="r",
-        seq=first,
-        writer="s",
-        driver="",
-        tick=tick,
-        episode=none,
-        time=ones,
-        x=x,
-        y=x,
-        heading=ones,
-        left=ones,
-        right=ones,
-        contact=none,
-        ended=[],
-    )
+        run="r", seq=first, writer="s", driver="", tick=tick, episode=none, time=ones, x=x, y=x, heading=ones,
+        left=ones, right=ones, contact=none, ended=[],
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -252,25 +204,10 @@ def test_ticks_without_a_command_are_told_in_a_few_lines(tmp_path: Path, paper: 
     translator._text = lambda tick, text, *_: told.append(text)  # type: ignore[method-assign]
     for tick, late in enumerate([0, 0, 1, 1, 3, 4, 5, 6]):
         at = [0.0]
-        translator.sim(
-            SimLog(
-                run="r",
-                seq=tick,
-                writer="s",
-                driver="",
-                tick=[tick],
-                episode=[0],
-                time=at,
-                x=at,
-                y=at,
-                heading=at,
-                left=at,
-                right=at,
-                contact=[0],
-                ended=[],
-                late=late,
-            )
-        )
+        translator.sim(SimLog(
+            run="r", seq=tick, writer="s", driver="", tick=[tick], episode=[0], time=at, x=at, y=at, heading=at,
+            left=at, right=at, contact=[0], ended=[], late=late,
+        ))  # fmt: skip
     assert told == [f"{late} ticks without a command in time so far" for late in (1, 3, 6)]
 
 
@@ -294,51 +231,18 @@ def test_the_papers_line_stands_beside_the_papers_system_alone(
     )
     ended = Episode(run="r", episode=0, tick=1, steps=1, end="reached", driver="a", x=0.0, y=0.0, heading=0.0)
     none, one = [0, 0], [1.0, 1.0]
-    translator.sim(
-        SimLog(
-            run="r",
-            seq=0,
-            writer="s",
-            driver="a",
-            tick=[0, 1],
-            episode=none,
-            time=one,
-            x=one,
-            y=one,
-            heading=one,
-            left=one,
-            right=one,
-            contact=none,
-            ended=[ended],
-        )
-    )
-    translator.sensors(
-        SensorsLog(
-            run="r",
-            seq=0,
-            writer="s",
-            sonar_model="built-in",
-            light_model=light,
-            tick=[0, 1],
-            sonar=[1.0] * 32,
-            light=[0.5] * 4,
-        )
-    )
-    translator.agent(
-        AgentLog(
-            run="r",
-            seq=0,
-            writer="a",
-            learner=learner,
-            percept=percept,
-            tick=[0, 1],
-            state=none,
-            action=none,
-            reward=one,
-            td_error=one,
-            temperature=one,
-        )
-    )
+    translator.sim(SimLog(
+        run="r", seq=0, writer="s", driver="a", tick=[0, 1], episode=none, time=one, x=one, y=one, heading=one,
+        left=one, right=one, contact=none, ended=[ended],
+    ))  # fmt: skip
+    translator.sensors(SensorsLog(
+        run="r", seq=0, writer="s", sonar_model="built-in", light_model=light, tick=[0, 1], sonar=[1.0] * 32,
+        light=[0.5] * 4,
+    ))  # fmt: skip
+    translator.agent(AgentLog(
+        run="r", seq=0, writer="a", learner=learner, percept=percept, tick=[0, 1], state=none, action=none, reward=one,
+        td_error=one, temperature=one,
+    ))  # fmt: skip
     translator.flush(last=True)
     recording.disconnect()
     assert len(series(tmp_path / "r.rrd", "/plots/success/rate", "Scalars:scalars")) == 1

@@ -104,16 +104,9 @@ class Simulation:
         if end:
             x, y, heading = self._start
             self.ended = Episode(
-                run=self.world.run,
-                episode=self._episode,
-                tick=self._tick - 1,
-                steps=self._steps,
-                end=end,
-                driver=author,
-                x=x,
-                y=y,
-                heading=heading,
-            )
+                run=self.world.run, episode=self._episode, tick=self._tick - 1, steps=self._steps, end=end,
+                driver=author, x=x, y=y, heading=heading,
+            )  # fmt: skip
             self.episodes += 1
             self.reached += end == "reached"
             self._idle = self._idle + 1 if end == "reached" and not self._steps else 0

@@ -16,7 +16,7 @@ class Control(Message, kw_only=True):
         "claim", "take over", "stand by", "release",
     ]  # fmt: skip
     """What the simulation does. status: nothing but reply. pause: it applies no more commands. resume: it goes on.
-    step: it applies one command of a paused run. speed: it sets the pace to `speed`. reset: it ends the present episode.
+    step: it applies one command of a paused run. speed: it sets the pace to `speed`. reset: it ends the episode.
     begin: it starts a new run with `seed`, and the driver stays. stop: it ends the process. claim: it seats `agent` if
     the seat is free. take over: it seats `agent` at the first tick boundary from tick `at` on. stand by: it seats
     `agent` when nobody else drives. release: it takes `agent` from the seat and from the queue."""
