@@ -105,7 +105,7 @@ def learners(arena: Arena) -> list[tuple[str, float, float]]:
     for name, percept in every:
         setup = make_setup(name, percept=percept)
         rate = statistics.median(1000 / train(setup, arena, number, 1000)[1] for number in range(ROUNDS))
-        learner = setup.agent(World("bench", arena, 1, 0)).learner
+        learner = setup.agent(World(run="bench", arena=arena, seed=1, epochs=0)).learner
         state = tuple(0 * size for size in PERCEPTS[percept].sizes) + learner.context
         step = Transition(state, 3, 0.01, state, False, 0.5, False)
         own = cost(partial(learner.values, state), 300) + cost(partial(learner.learn, step), 300)
@@ -115,7 +115,7 @@ def learners(arena: Arena) -> list[tuple[str, float, float]]:
 
 def crowds(arena: Arena) -> list[tuple[int, float]]:
     """Robot steps/s of evaluations with different numbers of robots."""
-    agent = SETUP.agent(World("bench", arena, 1, 0), learning=False)
+    agent = SETUP.agent(World(run="bench", arena=arena, seed=1, epochs=0), learning=False)
     rows = []
     for count in (1, 16, 256, 4096):
         rates = []
@@ -181,7 +181,7 @@ def over_the_bus(*words: str) -> float:
 
 def parts(arena: Arena) -> dict[str, float]:
     """The cost of each part of one tick, µs."""
-    loop = Loop(arena, SETUP.agent(World("bench", arena, 1, 0)), 1)
+    loop = Loop(arena, SETUP.agent(World(run="bench", arena=arena, seed=1, epochs=0)), 1)
     for _ in range(500):
         loop.step()
     state = loop.simulation.state
@@ -239,16 +239,25 @@ def recorder_cost(arena: Arena, loop: Loop) -> float:
 
     ticks, chunk, began = 8000, 16, 0.0
     with tempfile.TemporaryDirectory() as folder:
-        world = World("bench", arena, 1, 0)
+        world = World(run="bench", arena=arena, seed=1, epochs=0)
         recording = Recording(world, Path(folder) / "b.rrd", "127.0.0.1", free_ports(1)[0], "64MiB")
         translator = recording.translator
         began = time.perf_counter()
         for first in range(0, ticks, chunk):
             tick, ones = list(range(first, first + chunk)), [1.0] * chunk
             zeros = [0] * chunk
-            translator.sim(SimLog("b", 0, "w", "d", tick, zeros, ones, ones, ones, ones, ones, ones, zeros, []))
-            translator.sensors(SensorsLog("b", 0, "w", "", "", tick, [1.0] * 16 * chunk, [0.1] * 2 * chunk))
-            translator.agent(AgentLog("b", 0, "w", "qtable", "simple", tick, zeros, zeros, ones, ones, ones))
+            translator.sim(SimLog(
+                run="b", seq=0, writer="w", driver="d", tick=tick, episode=zeros, time=ones, x=ones, y=ones,
+                heading=ones, left=ones, right=ones, contact=zeros, ended=[],
+            ))  # fmt: skip
+            translator.sensors(SensorsLog(
+                run="b", seq=0, writer="w", sonar_model="", light_model="", tick=tick, sonar=[1.0] * 16 * chunk,
+                light=[0.1] * 2 * chunk,
+            ))  # fmt: skip
+            translator.agent(AgentLog(
+                run="b", seq=0, writer="w", learner="qtable", percept="simple", tick=tick, state=zeros, action=zeros,
+                reward=ones, td_error=ones, temperature=ones,
+            ))  # fmt: skip
             if first % 400 == 0:
                 translator.flush()
                 recording.keep()

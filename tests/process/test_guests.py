@@ -51,7 +51,7 @@ def test_the_foreign_example_drives_to_the_light_and_keeps_the_contract(start, w
     with open_session("observer", options) as session, Bus(session, world, "observer", "test") as bus:
         status = wait_status(bus, lambda status: status.reached >= 5, sim, sensors, guest)
         assert status.driver == "chaser"
-        assert bus.control(Control("begin", seed=5), timeout=20)
+        assert bus.control(Control(verb="begin", seed=5), timeout=20)
         wait_status(bus, lambda now: now.run != status.run and now.reached >= 2, sim, sensors, guest)
 
 
@@ -76,10 +76,10 @@ def test_an_agent_that_breaks_the_contract_is_told_where(start, world):
                 continue
             readings: Readings = event.message
             if not readings.driver:
-                bus.control(Control("claim", "rude"))
+                bus.control(Control(verb="claim", agent="rude"))
                 continue
             spin = 1.0 - spin
-            bus.put("command", Command(readings.run, readings.tick, "rude", spin, 0.0))
+            bus.put("command", Command(run=readings.run, tick=readings.tick, author="rude", left=spin, right=0.0))
     assert trial.end() == 4
     failed = [line for line in trial.stdout.splitlines() if line.startswith("FAIL")]
     assert [line.split(":")[0] for line in failed] == [

@@ -155,18 +155,22 @@ def test_columns_of_the_wrong_size_are_refused_and_the_run_goes_on(system, world
     options = BusOptions(name=world)
     with open_session("agent", options, "raw") as session, Bus(session, world, "agent", "raw") as bus:
         assert bus.wait_for("sim", 20)
-        assert bus.control(Control("claim", "raw"), timeout=10)
+        assert bus.control(Control(verb="claim", agent="raw"), timeout=10)
         now = wait(bus, lambda event: event.topic == "crowd/readings" and event.message.driver == "raw", sim).message
         good, none = pack(np.zeros(3)), pack(np.zeros(3), FLAG)
         for left, end in (
             (good[:-1], none), (good + good, none), (pack(np.full(3, np.nan)), none),
             (pack(np.full(3, 1.5)), none), (good, pack(np.full(3, 9), FLAG)), (good, b""),
         ):  # fmt: skip
-            bus.put("crowd/command", CommandOfMany(now.run, now.tick, "raw", left, good, end))
+            bus.put(
+                "crowd/command", CommandOfMany(run=now.run, tick=now.tick, author="raw", left=left, right=good, end=end)
+            )
         with observer(world) as watch:
             status = wait_status(watch, lambda status: sum(status.refused.values()) == 6, sim)
         assert status.tick == now.tick
-        bus.put("crowd/command", CommandOfMany(now.run, now.tick, "raw", good, good, none))
+        bus.put(
+            "crowd/command", CommandOfMany(run=now.run, tick=now.tick, author="raw", left=good, right=good, end=none)
+        )
         wait(bus, lambda event: event.topic == "crowd/readings" and event.message.tick == now.tick + 1, sim)
 
 

@@ -117,7 +117,7 @@ def test_any_percept_and_action_of_the_environment_can_be_seated(kind, percept, 
     kind("MlpPolicy", environment, device="cpu").save(tmp_path / "p.zip")
     model = load(tmp_path / "p.zip", trusted=True)
     assert isinstance(model, kind)
-    world = World("r", arenas.load("paper"), 0, 0)
+    world = World(run="r", arena=arenas.load("paper"), seed=0, epochs=0)
     agent = PolicyAgent(model, tmp_path / "p.zip", world, 50)
     simulation = Simulation(world.arena, 0, "r")
     suite = SensorSuite(simulation.world)

@@ -169,7 +169,7 @@ def test_a_driver_that_hangs_with_its_token_on_the_bus_loses_the_seat(start, wor
         observer(world) as bus,
     ):
         hung.wait_for("sim", 10)
-        claim = hung.control(Control("claim", "hung"))
+        claim = hung.control(Control(verb="claim", agent="hung"))
         assert claim is not None
         assert claim.ok
         waiting = wait_status(bus, lambda status: status.waiting_for == "the command of hung", sim, sensors)
@@ -178,8 +178,8 @@ def test_a_driver_that_hangs_with_its_token_on_the_bus_loses_the_seat(start, wor
         status = wait_status(bus, lambda status: status.driver == "heir", sim, sensors, standby)
         assert "agent/hung" in status.alive
         later = wait_status(bus, lambda now: now.tick > status.tick + 10, sim, sensors, standby)
-        hung.put("command", Command(later.run, later.tick, "hung", 1.0, 1.0))
-        hung.put("command", Command(later.run, 0, "hung", 1.0, 1.0))
+        hung.put("command", Command(run=later.run, tick=later.tick, author="hung", left=1.0, right=1.0))
+        hung.put("command", Command(run=later.run, tick=0, author="hung", left=1.0, right=1.0))
         wait_status(bus, lambda now: sum(n for why, n in now.refused.items() if "command" in why) >= 2, sim)
     assert "hung has been silent for 0.5 s and loses the seat" in sim.stderr
 
@@ -229,15 +229,15 @@ def test_a_killed_simulation_keeps_the_seat(start, world, tmp_path, speed, end, 
     options = BusOptions(name=world)
     with open_session("agent", options, "raw") as session, Bus(session, world, "agent", "raw") as bus:
         assert bus.wait_for("sim", DEADLINE)
-        assert bus.control(Control("claim", "raw"), timeout=DEADLINE)
+        assert bus.control(Control(verb="claim", agent="raw"), timeout=DEADLINE)
         asked = wait(bus, lambda event: event.topic == "readings" and event.message.driver == "raw", sim, sensors)
-        bus.put("command", Command("r", asked.message.tick, "raw", 0.0, 0.0, end))
+        bus.put("command", Command(run="r", tick=asked.message.tick, author="raw", left=0.0, right=0.0, end=end))
         wait(bus, lambda event: event.topic == "readings" and then(event.message), sim, sensors)
         sim.kill()
         wait(bus, lambda event: event.topic == "gone" and event.message[0] == "sim", sensors)
         again = start(*words)
         wait(bus, lambda event: event.topic == "alive" and event.message[0] == "sim", again, sensors)
-        reply = bus.control(Control("claim", "other"), timeout=DEADLINE)
+        reply = bus.control(Control(verb="claim", agent="other"), timeout=DEADLINE)
     assert reply is not None
     assert reply.reason == "the seat is kept for raw"
     assert reply.status.tick > 0

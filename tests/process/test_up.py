@@ -95,9 +95,9 @@ def test_intruders_are_refused_counted_and_harmless(up, world):
         for payload in bad.values():
             intruder.put(f"{world}/command", payload)
         assert not list(intruder.get(f"{world}/control", payload=b'{"verb": "self-destruct"}', timeout=1))
-        stolen = Command(status.run, status.tick, "intruder", 1.0, 1.0)
+        stolen = Command(run=status.run, tick=status.tick, author="intruder", left=1.0, right=1.0)
         wait_status(bus, lambda status: {*bad, "control: invalid"} <= set(status.refused), launcher)
-        reply = bus.control(Control("claim", "intruder"))
+        reply = bus.control(Control(verb="claim", agent="intruder"))
         assert reply is not None
         assert not reply.ok
         assert "taken" in reply.reason

@@ -3,6 +3,7 @@
 It keeps nothing on disk, so it is never killed.
 """
 
+from phototaxis.codec import Refused
 from phototaxis.machine import Effect, Event, Publish, Reply
 from phototaxis.messages import Command, Control, ControlReply, Status
 from phototaxis.protocol import Question
@@ -46,16 +47,19 @@ class Asker:
     def _control(self, asked: Control, reply, now: float) -> list[Effect]:
         seat, tick, driver = self.seat, self.simulation.state.tick, self.seat.driver
         reason = ""
-        if asked.verb == "claim":
-            reason = seat.claim(asked.agent, tick)
-        elif asked.verb == "stand by":
-            reason = seat.stand_by(asked.agent, tick)
-        elif asked.verb == "take over":
-            reason = seat.reserve(asked.agent, asked.at)
-            if not seat.driver:
-                seat.boundary(tick)
-        elif asked.verb == "release":
-            seat.leave(asked.agent, tick)
+        try:
+            if asked.verb == "claim":
+                seat.claim(asked.agent, tick)
+            elif asked.verb == "stand by":
+                seat.stand_by(asked.agent, tick)
+            elif asked.verb == "take over":
+                seat.reserve(asked.agent, asked.at)
+                if not seat.driver:
+                    seat.boundary(tick)
+            elif asked.verb == "release":
+                seat.leave(asked.agent, tick)
+        except Refused as why:
+            reason = str(why)
         run = self.simulation.world.run
         status = Status(run=run, phase="running", tick=tick, driver=seat.driver, drivers=seat.history)
         answer = Reply(reply, ControlReply(ok=not reason, reason=reason, status=status))

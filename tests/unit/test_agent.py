@@ -56,7 +56,7 @@ def test_temperature_falls_and_stays():
 
 
 def test_the_agent_learns_from_the_action_that_was_applied(setup: Setup, paper: Arena):
-    agent = setup.agent(World("r", paper, 0, 0))
+    agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=0))
     agent(readings(0))
     before = agent.learner.save()["table"]
     agent(readings(1, left=1.0, right=-1.0, author="someone"))
@@ -72,22 +72,22 @@ def test_the_agent_learns_from_the_action_that_was_applied(setup: Setup, paper: 
 
 def test_episodes_end_at_the_light_and_at_the_cap(paper: Arena):
     setup = make_setup(cap=3)
-    agent = setup.agent(World("r", paper, 0, 0))
+    agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=0))
     ends = [agent(readings(tick, left=1.0, right=1.0, author="a")).end for tick in range(5)]
     assert ends == ["", "", "", "cap", "cap"]
     assert agent(readings(9, episode=1, light=(0.2, 0.96))).end == "reached"
 
 
 def test_a_checkpoint_continues_bit_for_bit(tmp_path: Path, setup: Setup, paper: Arena):
-    whole = Loop(paper, setup.agent(World("r", paper, 3, 2000)), 3, 2000)
+    whole = Loop(paper, setup.agent(World(run="r", arena=paper, seed=3, epochs=2000)), 3, 2000)
     for tick in range(1700):
         if tick == 1000:
             save(tmp_path / "c.npz", *whole.agent.checkpoint())
         whole.step()
     half = Loop(paper, whole.agent, 3, 2000)
-    half.agent = setup.agent(World("r", paper, 3, 2000))
+    half.agent = setup.agent(World(run="r", arena=paper, seed=3, epochs=2000))
     half.agent.restore(*load(tmp_path / "c.npz"), source="c.npz")
-    replay = Loop(paper, setup.agent(World("r", paper, 3, 2000)), 3, 2000)
+    replay = Loop(paper, setup.agent(World(run="r", arena=paper, seed=3, epochs=2000)), 3, 2000)
     for tick in range(1700):
         if tick == 1000:
             replay.agent = half.agent
@@ -98,14 +98,14 @@ def test_a_checkpoint_continues_bit_for_bit(tmp_path: Path, setup: Setup, paper:
 
 @pytest.fixture
 def file(tmp_path: Path, setup: Setup, paper: Arena) -> Path:
-    agent = setup.agent(World("r", paper, 0, 10))
+    agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=10))
     agent(readings(0))
     save(tmp_path / "c.npz", *agent.checkpoint())
     return tmp_path / "c.npz"
 
 
 def test_a_checkpoint_of_another_percept_is_refused(file: Path, paper: Arena):
-    rich = make_setup(percept="rich").agent(World("r", paper, 0, 10))
+    rich = make_setup(percept="rich").agent(World(run="r", arena=paper, seed=0, epochs=10))
     with pytest.raises(UserError, match="of the percept 'simple', but 'rich' is asked for"):
         rich.restore(*load(file), source=str(file))
 
@@ -145,7 +145,7 @@ def test_an_unknown_learner_lists_those_there_are():
 
 
 def test_a_frozen_agent_does_not_learn(setup: Setup, paper: Arena):
-    agent: Agent = setup.agent(World("r", paper, 0, 0), learning=False)
+    agent: Agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=0), learning=False)
     before = agent.checkpoint()[0].learner_hash
     for tick in range(20):
         agent(readings(tick, left=1.0, right=1.0, author="a"))

@@ -40,7 +40,7 @@ def learned(arena: str) -> None:
     """Leave `c.npz`, of an agent that learned in an arena."""
     from phototaxis_sim import arenas
 
-    agent = make_setup().agent(World("r", arenas.load(arena), 0, 10))
+    agent = make_setup().agent(World(run="r", arena=arenas.load(arena), seed=0, epochs=10))
     checkpoint.save(Path("c.npz"), *agent.checkpoint())
 
 
@@ -102,7 +102,7 @@ def test_a_checkpoint_of_a_later_format_is_refused_in_one_line(folder):
 
 
 def test_an_agent_that_meets_another_world_goes_on_there(paper: Arena):
-    agent = make_setup().agent(World("r", paper, 0, 10))
+    agent = make_setup().agent(World(run="r", arena=paper, seed=0, epochs=10))
     other = msgspec.structs.replace(paper, name="other", sensing=msgspec.structs.replace(paper.sensing, near=0.7))
     agent.enter(other)
     meta, _ = agent.checkpoint()

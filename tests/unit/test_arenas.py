@@ -96,7 +96,7 @@ def test_a_wrong_file_is_told_in_one_line(text, words):
 
 
 def test_a_message_with_no_world_in_it_is_refused_at_every_door(paper):
-    world = msgspec.to_builtins(World("r", paper, 0, 0))
+    world = msgspec.to_builtins(World(run="r", arena=paper, seed=0, epochs=0))
     decode = Decoder(World, 1_000_000)
     assert decode(msgspec.msgpack.encode(world)).arena == paper
     world["arena"]["walls"] = [{"start": [math.nan, 1.0], "end": [2.0, 2.0]}]

@@ -121,7 +121,10 @@ def test_numbers_of_other_libraries_are_errors_that_can_be_recorded(make, name):
     last = drive(make(learn=ERRORS[name])).last
     assert type(last.td_error) is float
     number, action, reward, error, heat = last
-    on_the_wire(AgentLog("r", 0, "a", "theirs", "simple", [3], [number], [action], [reward], [error], [heat]))
+    on_the_wire(AgentLog(
+        run="r", seq=0, writer="a", learner="theirs", percept="simple", tick=[3], state=[number], action=[action],
+        reward=[reward], td_error=[error], temperature=[heat],
+    ))  # fmt: skip
 
 
 FAULTY_VALUES = {
@@ -368,7 +371,7 @@ def test_the_process_of_whoever_embeds_a_learner_is_left_as_it_is(paper: Arena):
     try:
         with warnings.catch_warnings(record=True) as warned:
             for name in ("ann", "ann-per-action", "elman", "dqn"):
-                loop = Loop(paper, make_setup(name).agent(World("r", paper, 0, 5)), 0, 5)
+                loop = Loop(paper, make_setup(name).agent(World(run="r", arena=paper, seed=0, epochs=5)), 0, 5)
                 while not loop.simulation.finished:
                     loop.step()
                 loop.agent.table()

@@ -59,7 +59,7 @@ def test_a_crowd_moves_as_each_robot_would_alone(name):
 def test_a_crowd_senses_as_each_robot_would_alone(name, noise):
     arena = arenas.load(name)
     arena = msgspec.structs.replace(arena, sensing=msgspec.structs.replace(arena.sensing, noise=noise))
-    world, physics, rng = World("r", arena, 5, 0), Physics(arena), np.random.default_rng(1)
+    world, physics, rng = World(run="r", arena=arena, seed=5, epochs=0), Physics(arena), np.random.default_rng(1)
     suite, crowd, state = SensorSuite(world), CrowdSuite(world), Simulation(arena, 0, "r").state
     lit = 0
     for tick in range(300):
@@ -106,7 +106,7 @@ def test_draws_of_many_are_draws_of_one():
 
 
 def test_an_evaluation_follows_from_its_seed(paper: Arena):
-    agent = make_setup().agent(World("r", paper, 0, 10), learning=False)
+    agent = make_setup().agent(World(run="r", arena=paper, seed=0, epochs=10), learning=False)
     steps: list[None] = []
     first = evaluate(paper, agent, 20, seed=3, cap=30, stepped=lambda: steps.append(None))
     assert 0 < len(steps) <= 30
@@ -116,7 +116,7 @@ def test_an_evaluation_follows_from_its_seed(paper: Arena):
 
 def test_an_agent_that_learns_is_not_evaluated(paper: Arena):
     with pytest.raises(ValueError, match="must not learn"):
-        evaluate(paper, make_setup().agent(World("r", paper, 0, 10)), 5, seed=0)
+        evaluate(paper, make_setup().agent(World(run="r", arena=paper, seed=0, epochs=10)), 5, seed=0)
 
 
 def test_the_direct_way_is_turning_and_driving(paper: Arena):

@@ -97,7 +97,7 @@ def test_sixteen_beams_in_one_instance_or_one_in_each(fmu: Built, paper: Arena, 
 @VERSIONS
 def test_many_robots_have_their_own_instances(fmu: Built, paper: Arena, sensors, version):
     quiet = msgspec.structs.replace(paper, sensing=msgspec.structs.replace(paper.sensing, noise=0.0))
-    world = World("w", quiet, 3, 0)
+    world = World(run="w", arena=quiet, seed=3, epochs=0)
     ours = CrowdSuite(world)
     poses = np.array([[moment.x, moment.y, moment.heading] for moment in drive(30)])
     for kind, name in (("light", "light"), ("sonar", "sonar")):

@@ -126,7 +126,10 @@ def test_fresh_instances_on_request(fmu: Built, paper: Arena, sensors, tmp_path:
 
 def test_many_robots_with_an_fmu_that_cannot_be_reset(fmu: Built, paper: Arena, sensors, tmp_path: Path):
     odd = altered(tmp_path / "odd.fmu", "lag", 2, {RESET[2]: f"{HEAD[2]} return 3; }}"})
-    world, poses = World("w", paper, 3, 0), np.array([[moment.x, moment.y, moment.heading] for moment in drive(10)])
+    world, poses = (
+        World(run="w", arena=paper, seed=3, epochs=0),
+        np.array([[moment.x, moment.y, moment.heading] for moment in drive(10)]),
+    )
     both = [sensors(light_fmu=str(file)).crowd(world, len(poses)) for file in (odd, fmu("lag", 2))]
     for tick in range(3):
         assert np.array_equal(both[0](tick, poses)[1], both[1](tick, poses)[1])

@@ -47,7 +47,7 @@ def test_it_is_found_without_importing_us():
 def test_it_does_what_an_agent_in_one_process_meets():
     """The same placements, readings and rewards as the loop of `phototaxis train`, action by action."""
     arena, episodes, reward = arenas.load("paper"), 0, 0.0
-    agent = make_setup("qtable").agent(World("x", arena, 5, 0))
+    agent = make_setup("qtable").agent(World(run="x", arena=arena, seed=5, epochs=0))
     loop = Loop(arena, agent, 5)
     environment = gymnasium.make(NAME, cap=100)
     seen, _ = environment.reset(seed=5)

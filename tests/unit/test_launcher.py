@@ -51,7 +51,8 @@ def test_a_watched_demo_begins_and_ends_slowly(monkeypatch: pytest.MonkeyPatch):
 
     def at(epoch: int, phase: str = "paused", driver: str = "qtable-1", waiting_for: str = "") -> list[str]:
         wire.asked.clear()
-        story.follow(Status("r", phase, waiting_for, epoch=epoch, epochs=3000, driver=driver), wire, said)  # pyright: ignore
+        status = Status(run="r", phase=phase, waiting_for=waiting_for, epoch=epoch, epochs=3000, driver=driver)  # pyright: ignore
+        story.follow(status, wire, said)  # pyright: ignore
         return [*wire.asked]
 
     def due() -> bool:
@@ -87,7 +88,7 @@ def test_a_demo_that_nobody_watches_is_left_alone():
     story = demo.Story(UpOptions(epochs=3000), FmuOptions(), stays=False, paced=False)
     wire, said = Wire(), Said()
     for epoch in range(0, 3001, 100):
-        story.follow(Status("r", "running", epoch=epoch, epochs=3000, driver="q"), wire, said)  # pyright: ignore
+        story.follow(Status(run="r", phase="running", epoch=epoch, epochs=3000, driver="q"), wire, said)  # pyright: ignore
         story.beat(wire)  # pyright: ignore
     assert not wire.asked
     assert not said
@@ -114,7 +115,7 @@ def test_the_papers_number_is_told_of_the_papers_system_alone(learner, given, op
 
 def test_success_is_told_of_episodes_that_have_ended():
     def told(episodes: int, reached: int, recent: float) -> str:
-        return success(Status("r", "running", episodes=episodes, reached=reached, recent=recent))
+        return success(Status(run="r", phase="running", episodes=episodes, reached=reached, recent=recent))
 
     assert told(0, 0, 0.0) == "no episode has ended yet"
     assert told(1, 0, 0.0) == "the first episode did not reach the light"
@@ -167,10 +168,10 @@ def test_the_launchers_own_agents_are_not_those_that_are_started_alone(words):
 
 
 def test_a_swap_says_what_delays_it():
-    assert swap.what_delays(Status("r", "running")) == ""
-    assert "phototaxis control resume" in swap.what_delays(Status("r", "paused"))
+    assert swap.what_delays(Status(run="r", phase="running")) == ""
+    assert "phototaxis control resume" in swap.what_delays(Status(run="r", phase="paused"))
     with pytest.raises(Unavailable, match="the run r is finished"):
-        swap.what_delays(Status("r", "finished"))
+        swap.what_delays(Status(run="r", phase="finished"))
 
 
 @pytest.fixture

@@ -33,12 +33,12 @@ def test_these_are_the_names():
 @pytest.mark.parametrize(("name", "percept"), EVERY)
 def test_a_checkpoint_continues_bit_for_bit(tmp_path, paper: Arena, name, percept):
     setup, epochs, half = make_setup(name, percept=percept, cap=40), 360, 200
-    whole = Loop(paper, setup.agent(World("r", paper, 3, epochs)), 3, epochs)
-    other = Loop(paper, setup.agent(World("r", paper, 3, epochs)), 3, epochs)
+    whole = Loop(paper, setup.agent(World(run="r", arena=paper, seed=3, epochs=epochs)), 3, epochs)
+    other = Loop(paper, setup.agent(World(run="r", arena=paper, seed=3, epochs=epochs)), 3, epochs)
     for tick in range(epochs):
         if tick == half:
             save(tmp_path / "c.npz", *whole.agent.checkpoint())
-            other.agent = setup.agent(World("r", paper, 3, epochs))
+            other.agent = setup.agent(World(run="r", arena=paper, seed=3, epochs=epochs))
             other.agent.restore(*load(tmp_path / "c.npz"), source="c.npz")
         whole.step()
         other.step()
@@ -48,7 +48,7 @@ def test_a_checkpoint_continues_bit_for_bit(tmp_path, paper: Arena, name, percep
 
 @pytest.mark.parametrize(("name", "percept"), EVERY)
 def test_values_of_many_are_values_of_each(paper: Arena, name, percept):
-    agent = make_setup(name, percept=percept).agent(World("r", paper, 3, 300))
+    agent = make_setup(name, percept=percept).agent(World(run="r", arena=paper, seed=3, epochs=300))
     loop, states, actions = Loop(paper, agent, 3, 300), [], []
     for _ in range(60):
         loop.step()

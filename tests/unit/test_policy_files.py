@@ -51,7 +51,7 @@ def save(
 
 
 def agent(file: Path, paper: Arena, **more: Any) -> PolicyAgent:
-    return PolicyFile(file, trusted=True, **more)(World("x", paper, 5, 0), CAP)
+    return PolicyFile(file, trusted=True, **more)(World(run="x", arena=paper, seed=5, epochs=0), CAP)
 
 
 def drive(agents: list[PolicyAgent], paper: Arena, ticks: int) -> list[list[tuple[float, float, str]]]:

@@ -53,7 +53,7 @@ def test_recorders_that_start_together_have_files_of_their_own(tmp_path):
 
 def test_a_checkpoint_that_many_write_is_one_of_theirs(tmp_path, setup, paper):
     path = tmp_path / "c.npz"
-    meta, _ = setup.agent(World("r", paper, 0, 0)).checkpoint()
+    meta, _ = setup.agent(World(run="r", arena=paper, seed=0, epochs=0)).checkpoint()
 
     def save(number):
         arrays = {"values": np.full(100_000, float(number))}

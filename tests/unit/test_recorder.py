@@ -87,11 +87,12 @@ def test_old_and_excessive_recordings_go_and_the_one_in_use_stays():
 def test_a_percept_that_nobody_knows_is_recorded_without_a_picture_of_its_states(tmp_path: Path, paper: Arena):
     recording = rr.RecordingStream("phototaxis", recording_id="r")
     recording.save(str(tmp_path / "r.rrd"))
-    translator = Translator(recording, World("r", paper, 0, 0))
+    translator = Translator(recording, World(run="r", arena=paper, seed=0, epochs=0))
     one = [0.5, 0.5]
-    translator.agent(
-        AgentLog("r", 0, "w", "mine", "camera", [0, 1], [0, 0], [4, 4], one, one, one, [1.0] * 7, [1], [2.0] * 9)
-    )
+    translator.agent(AgentLog(
+        run="r", seq=0, writer="w", learner="mine", percept="camera", tick=[0, 1], state=[0, 0], action=[4, 4],
+        reward=one, td_error=one, temperature=one, values=[1.0] * 7, visits=[1], current=[2.0] * 9,
+    ))  # fmt: skip
     translator.flush(last=True)
     recording.disconnect()
     assert sorted(series(tmp_path / "r.rrd", "/plots/reward", "Scalars:scalars")) == [0, 1]
@@ -102,10 +103,16 @@ def test_a_percept_that_nobody_knows_is_recorded_without_a_picture_of_its_states
 def test_a_pose_that_nobody_sensed_has_no_rays_of_another(tmp_path: Path, paper: Arena):
     recording = rr.RecordingStream("phototaxis", recording_id="r")
     recording.save(str(tmp_path / "r.rrd"))
-    translator = Translator(recording, World("r", paper, 0, 0))
+    translator = Translator(recording, World(run="r", arena=paper, seed=0, epochs=0))
     none, place = [0, 0, 0], [1.0, 1.0, 1.0]
-    translator.sim(SimLog("r", 0, "s", "", [0, 1, 2], none, place, place, place, place, place, place, none, []))
-    translator.sensors(SensorsLog("r", 0, "s", "built-in", "built-in", [0, 1], [1.0] * 32, [0.5] * 4))
+    translator.sim(SimLog(
+        run="r", seq=0, writer="s", driver="", tick=[0, 1, 2], episode=none, time=place, x=place, y=place,
+        heading=place, left=place, right=place, contact=none, ended=[],
+    ))  # fmt: skip
+    translator.sensors(SensorsLog(
+        run="r", seq=0, writer="s", sonar_model="built-in", light_model="built-in", tick=[0, 1], sonar=[1.0] * 32,
+        light=[0.5] * 4,
+    ))  # fmt: skip
     translator.flush(last=True)
     recording.disconnect()
     assert sorted(series(tmp_path / "r.rrd", "/world/trail", "Points2D:positions")) == [0, 1, 2]
@@ -116,13 +123,18 @@ def moved(first: int, ticks: int) -> SimLog:
     """So many ticks of poses, which differ, so that a recording of them has its size."""
     tick, none = list(range(first, first + ticks)), [0] * ticks
     x, ones = np.random.default_rng(first).uniform(1, 9, ticks).tolist(), [1.0] * ticks
-    return SimLog("r", first, "s", "", tick, none, ones, x, x, ones, ones, ones, none, [])
+    return SimLog(
+        run="r", seq=first, writer="s", driver="", tick=tick, episode=none, time=ones, x=x, y=x, heading=ones,
+        left=ones, right=ones, contact=none, ended=[],
+    )  # fmt: skip
 
 
 @pytest.fixture
 def recording(tmp_path: Path, paper: Arena) -> Recording:
     """A recording of the run "r" into r.rrd."""
-    return Recording(World("r", paper, 0, 0), tmp_path / "r.rrd", "127.0.0.1", free_ports(1)[0], "16MiB")
+    return Recording(
+        World(run="r", arena=paper, seed=0, epochs=0), tmp_path / "r.rrd", "127.0.0.1", free_ports(1)[0], "16MiB"
+    )
 
 
 def record(recording: Recording, until: int) -> None:
@@ -168,7 +180,7 @@ def test_a_recording_whose_folder_is_gone_says_so(recording: Recording):
 
 def test_a_recording_without_a_place_is_a_live_view(tmp_path: Path, paper: Arena):
     wanted = tmp_path / "gone" / "r.rrd"
-    recording = Recording(World("r", paper, 0, 0), wanted, "127.0.0.1", free_ports(1)[0], "16MiB")
+    recording = Recording(World(run="r", arena=paper, seed=0, epochs=0), wanted, "127.0.0.1", free_ports(1)[0], "16MiB")
     record(recording, 100)
     recording.close()
     assert recording.fault == f"{wanted}: No such file or directory; nothing is recorded"
@@ -188,11 +200,14 @@ def test_no_recording_is_overwritten(tmp_path: Path):
 
 def test_ticks_without_a_command_are_told_in_a_few_lines(tmp_path: Path, paper: Arena):
     recording, told = rr.RecordingStream("test"), []
-    translator = Translator(recording, World("r", paper, 0, 0))
+    translator = Translator(recording, World(run="r", arena=paper, seed=0, epochs=0))
     translator._text = lambda tick, text, *_: told.append(text)  # type: ignore[method-assign]
     for tick, late in enumerate([0, 0, 1, 1, 3, 4, 5, 6]):
         at = [0.0]
-        translator.sim(SimLog("r", tick, "s", "", [tick], [0], at, at, at, at, at, at, [0], [], late))
+        translator.sim(SimLog(
+            run="r", seq=tick, writer="s", driver="", tick=[tick], episode=[0], time=at, x=at, y=at, heading=at,
+            left=at, right=at, contact=[0], ended=[], late=late,
+        ))  # fmt: skip
     assert told == [f"{late} ticks without a command in time so far" for late in (1, 3, 6)]
 
 
@@ -211,12 +226,23 @@ def test_the_papers_line_stands_beside_the_papers_system_alone(
 ):
     recording = rr.RecordingStream("phototaxis", recording_id="r")
     recording.save(str(tmp_path / "r.rrd"))
-    translator = Translator(recording, World("r", msgspec.structs.replace(paper, name=arena), 0, 0))
+    translator = Translator(
+        recording, World(run="r", arena=msgspec.structs.replace(paper, name=arena), seed=0, epochs=0)
+    )
     ended = Episode(run="r", episode=0, tick=1, steps=1, end="reached", driver="a", x=0.0, y=0.0, heading=0.0)
     none, one = [0, 0], [1.0, 1.0]
-    translator.sim(SimLog("r", 0, "s", "a", [0, 1], none, one, one, one, one, one, one, none, [ended]))
-    translator.sensors(SensorsLog("r", 0, "s", "built-in", light, [0, 1], [1.0] * 32, [0.5] * 4))
-    translator.agent(AgentLog("r", 0, "a", learner, percept, [0, 1], none, none, one, one, one))
+    translator.sim(SimLog(
+        run="r", seq=0, writer="s", driver="a", tick=[0, 1], episode=none, time=one, x=one, y=one, heading=one,
+        left=one, right=one, contact=none, ended=[ended],
+    ))  # fmt: skip
+    translator.sensors(SensorsLog(
+        run="r", seq=0, writer="s", sonar_model="built-in", light_model=light, tick=[0, 1], sonar=[1.0] * 32,
+        light=[0.5] * 4,
+    ))  # fmt: skip
+    translator.agent(AgentLog(
+        run="r", seq=0, writer="a", learner=learner, percept=percept, tick=[0, 1], state=none, action=none, reward=one,
+        td_error=one, temperature=one,
+    ))  # fmt: skip
     translator.flush(last=True)
     recording.disconnect()
     assert len(series(tmp_path / "r.rrd", "/plots/success/rate", "Scalars:scalars")) == 1

@@ -22,7 +22,7 @@ def sense(arena: Arena, pose: tuple[float, float, float], noise: float = 0.0, ti
     state = Simulation(arena, 0, "r").state
     state.x, state.y, state.heading = Pose(*pose)
     state.tick = tick
-    return SensorSuite(World("r", arena, 5, 0))(state)
+    return SensorSuite(World(run="r", arena=arena, seed=5, epochs=0))(state)
 
 
 def test_sonars_measure_to_the_walls(paper: Arena):

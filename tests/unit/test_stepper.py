@@ -131,7 +131,8 @@ def test_a_command_counts_once_for_its_tick_and_from_the_driver_alone():
     desk = seated()
     desk.command()
     state = desk.machine.steps.simulation.state
-    for wrong in ({"tick": 0}, {"tick": 2}, {"author": "b"}, {"author": ""}, {"run": "other"}):
+    mistakes: list[dict[str, Any]] = [{"tick": 0}, {"tick": 2}, {"author": "b"}, {"author": ""}, {"run": "other"}]
+    for wrong in mistakes:
         (refused,) = desk.command(**wrong)
         assert isinstance(refused, Refuse)
     assert desk.machine.steps.simulation.state is state

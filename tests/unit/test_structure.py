@@ -85,6 +85,12 @@ def test_a_room_has_one_name(name):
     assert name == "contract" or name in EXTRAS
 
 
+@pytest.mark.parametrize("name", ROOMS)
+def test_a_rooms_types_are_there_for_whoever_imports_it(name):
+    (package,) = ROOMS[name].iterdir()
+    assert (package / "py.typed").is_file()
+
+
 def test_what_is_listed_of_rooms_exists():
     assert len(PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]) == len(ROOMS)
     assert len(PROJECT["tool"]["pyright"]["extraPaths"]) == len(ROOMS)

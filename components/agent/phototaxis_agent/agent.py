@@ -127,7 +127,9 @@ class Agent:
             action = self.percept.actions[draw(self.learner.values(state), temperature, self._rng.random())]
             left, right = ACTIONS[action]
         self.last = Step(number, action, reward, error, temperature)
-        self.command = Command(readings.run, readings.tick, self.author, left, right, end)
+        self.command = Command(
+            run=readings.run, tick=readings.tick, author=self.author, left=left, right=right, end=end
+        )
         return self.command
 
     def _where(self) -> str:
@@ -239,7 +241,10 @@ class Agent:
         self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
         self._memory.lights.extend(meta.lights)
         self._state, self._linked = meta.state or None, meta.linked
-        self.command = None if meta.answer is None else Command(meta.run, meta.tick, self.author, *meta.answer)
+        self.command = None
+        if meta.answer is not None:
+            left, right, end = meta.answer
+            self.command = Command(run=meta.run, tick=meta.tick, author=self.author, left=left, right=right, end=end)
 
     @property
     def tick(self) -> tuple[str, int]:

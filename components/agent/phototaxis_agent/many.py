@@ -59,12 +59,14 @@ class Flock:
         for row, robot in enumerate(self._robots):
             front, rear = contact[row]
             seen = Readings(
-                readings.run, readings.tick, episode[row], readings.epoch, sonar[row], tuple(light[row]),
-                front, rear, left[row], right[row], readings.author, readings.driver,
+                run=readings.run, tick=readings.tick, episode=episode[row], epoch=readings.epoch, sonar=sonar[row],
+                light=tuple(light[row]), front=front, rear=rear, left=left[row], right=right[row],
+                author=readings.author, driver=readings.driver,
             )  # fmt: skip
             answers.append(robot(seen))
         ends = np.array([ENDS.index(one.end) for one in answers])
         return CommandOfMany(
-            readings.run, readings.tick, self._robots[0].author, pack(np.array([one.left for one in answers])),
-            pack(np.array([one.right for one in answers])), pack(ends, FLAG),
+            run=readings.run, tick=readings.tick, author=self._robots[0].author,
+            left=pack(np.array([one.left for one in answers])), right=pack(np.array([one.right for one in answers])),
+            end=pack(ends, FLAG),
         )  # fmt: skip

@@ -1,7 +1,10 @@
 """The wire format as a page for those who write a component in another language, made from the tables and Structs."""
 
 import json
+import typing
+from collections.abc import Iterator
 from importlib.resources import files
+from itertools import chain
 from string import Template
 from typing import Any
 
@@ -20,7 +23,8 @@ def page() -> str:
         topics=topics.table(),
         limits=_limits(),
         rights=rights.table(),
-        messages="\n\n".join([*map(_message, topics.TOPICS.values()), _fields(messages.LogRequest, "log/…")]),
+        messages="\n\n".join(_fields(kind, key) for kind, key in _keys().items()),
+        parts="\n\n".join(_fields(kind) for kind in structs(*_keys()) if kind not in _keys()),
         json_schema=json.dumps(_schema(), indent=1),
         first=f"{defaults['first']:g}",
         most=f"{defaults['most']:g}",
@@ -41,22 +45,37 @@ def _limits() -> str:
     return "\n".join(["| key | largest message or question, bytes | largest answer, bytes |", "|---|--:|--:|", *rows])
 
 
-def _message(topic: topics.Topic) -> str:
-    kinds = [topic.message, *([topic.reply] if topic.reply else [])]
-    return "\n\n".join(_fields(kind, topic.name) for kind in kinds)
+def _keys() -> dict[type[msgspec.Struct], str]:
+    """The messages of the bus, and the key of each."""
+    kinds = [(kind, topic.name) for topic in topics.TOPICS.values() for kind in (topic.message, topic.reply) if kind]
+    return {**dict(kinds), messages.LogRequest: "log/…"}
 
 
-def _fields(kind: type[messages.Message], topic: str) -> str:
+def structs(*kinds: Any) -> list[type[msgspec.Struct]]:
+    """Each Struct that is among types or inside them, once, the outer before the inner."""
+    return [*dict.fromkeys(chain.from_iterable(map(_inside, kinds)))]
+
+
+def _inside(kind: Any) -> Iterator[type[msgspec.Struct]]:
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        yield kind
+        for field in msgspec.structs.fields(kind):
+            yield from _inside(field.type)
+    for part in typing.get_args(kind):
+        yield from _inside(part)
+
+
+def _fields(kind: type[msgspec.Struct], key: str = "") -> str:
     from phototaxis.options import field_help
 
     texts = field_help(kind)
     rows = [
-        f"| `{field.name}` | {_type(field.type)} | {'yes' if field.required else 'no'} | {texts.get(field.name, '')} |"
+        f"| `{field.name}` | {_type(field.type)} | {'yes' if field.required else 'no'} | {texts[field.name]} |"
         for field in msgspec.structs.fields(kind)
     ]
     about = " ".join((kind.__doc__ or "").split())
-    head = f"### {kind.__name__} (`{topic}`)\n\n{about}\n"
-    return "\n".join([head, "| field | type | required | |", "|---|---|---|---|", *rows])
+    head = f"### {kind.__name__}{f' (`{key}`)' if key else ''}\n\n{about}\n"
+    return "\n".join([head, "| field | type | required | what |", "|---|---|---|---|", *rows])
 
 
 def _type(kind: Any) -> str:
@@ -74,15 +93,16 @@ def _type(kind: Any) -> str:
 
 
 BOUNDS = {
+    "exclusiveMinimum": "above",
     "minimum": "from",
     "maximum": "to",
     "minItems": "at least",
     "maxItems": "at most",
+    "minLength": "at least",
     "maxLength": "at most",
 }
 
 
 def _schema() -> dict[str, Any]:
-    kinds = [kind for topic in topics.TOPICS.values() for kind in (topic.message, topic.reply) if kind]
-    _, components = msgspec.json.schema_components([*kinds, messages.LogRequest])
+    _, components = msgspec.json.schema_components(_keys())
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$defs": components}

@@ -82,7 +82,7 @@ class Link:
         """The first readings of a run with this seed; whoever drives is asked to hand over first."""
         self._check_open()
         self._sit()
-        reply = self._bus.control(Control("begin", self.ident, seed=seed), timeout=self._timeout)
+        reply = self._bus.control(Control(verb="begin", agent=self.ident, seed=seed), timeout=self._timeout)
         if reply is None or not reply.ok:
             raise Error(f"{self._where} does not begin anew: {reply.reason if reply else 'no answer'}")
         self._now = None
@@ -191,7 +191,7 @@ class Link:
         """Why no readings come, as far as the simulation can tell."""
         if missing := [role for role in ("sim", "sensors") if role not in self._present]:
             return f"{' and '.join(missing)} not there"
-        reply = self._bus.control(Control("status"))
+        reply = self._bus.control(Control(verb="status"))
         if reply is None:
             return "the simulation is there, but does not answer"
         status = reply.status

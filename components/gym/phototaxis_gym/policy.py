@@ -127,7 +127,9 @@ class PolicyAgent(Policy):
             ((left, right),) = self.motors(readings, memory, np.array([self._steps == 0])).tolist()
             action = _INDEX.get((left, right), -1)
         self.last = (0, action, reward, 0.0, 0.0)
-        self.command = Command(readings.run, readings.tick, self.author, left, right, end)
+        self.command = Command(
+            run=readings.run, tick=readings.tick, author=self.author, left=left, right=right, end=end
+        )
         return self.command
 
     @property
@@ -162,7 +164,10 @@ class PolicyAgent(Policy):
         self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
         self._memory.clear()
         self._memory.lights.extend(meta.lights)
-        self.command = None if meta.answer is None else Command(meta.run, meta.tick, self.author, *meta.answer)
+        self.command = None
+        if meta.answer is not None:
+            left, right, end = meta.answer
+            self.command = Command(run=meta.run, tick=meta.tick, author=self.author, left=left, right=right, end=end)
 
 
 class PolicyCrowd(Policy):

@@ -46,7 +46,7 @@ class System(Struct, frozen=True):
 
     def check(self) -> None:
         """UserError when there is no such arena, learner or option, or when they do not go together."""
-        self.setup().agent(World("check", arenas.enter(self.arena), 0, 1))
+        self.setup().agent(World(run="check", arena=arenas.enter(self.arena), seed=0, epochs=1))
 
     def __str__(self) -> str:
         words = [self.learner, self.percept, *([self.reward] if self.reward != "preset" else [])]
@@ -97,7 +97,7 @@ class Learned(NamedTuple):
 def learn(cell: Cell) -> Learned:
     """The agent of a cell, with what it went through."""
     arena = arenas.load(cell.system.arena)
-    world = World("lab", arena, cell.seed, cell.epochs)
+    world = World(run="lab", arena=arena, seed=cell.seed, epochs=cell.epochs)
     agent = cell.system.setup().agent(world)
     loop = Loop(arena, agent, cell.seed, cell.epochs)
     rewards, speeds = np.zeros(cell.epochs), np.zeros(cell.epochs)

@@ -74,12 +74,12 @@ class Trial:
 
     def __init__(self, sim: Bus, sensors: Bus, within: float, patience: float):
         self._sim, self._sensors, self._within, self._patience = sim, sensors, within, patience
-        self._world = World(run_name(), arenas.load("paper"), 0, 0)
+        self._world = World(run=run_name(), arena=arenas.load("paper"), seed=0, epochs=0)
         self._simulation = Simulation(self._world.arena, 0, self._world.run, 0)
         self._suite = SensorSuite(self._world)
         self._agent = ""
         self._asked: Readings | None = None
-        self._answer = Command("", 0, "", 0.0, 0.0)
+        self._answer = Command(run="", tick=0, author="", left=0.0, right=0.0)
         """The last one that was as it should be."""
 
     def run(self, ticks: int) -> Iterator[Verdict]:
@@ -213,4 +213,8 @@ class Trial:
             request = event.message
             if request.verb in ("claim", "take over", "stand by"):
                 self._agent = self._agent or request.agent
-            event.reply(ControlReply(True, "", Status(self._world.run, "running", driver=self._agent)))
+            event.reply(
+                ControlReply(
+                    ok=True, reason="", status=Status(run=self._world.run, phase="running", driver=self._agent)
+                )
+            )

@@ -62,7 +62,7 @@ def main(argv: Sequence[str]) -> int:
     meta, arrays = load(path)
     arena = where(path, meta, options.arena)
     setup = from_checkpoint(meta, str(path))
-    agent = setup.agent(World("evaluation", arena, options.seed + SEED_OFFSET, 0), learning=False)
+    agent = setup.agent(World(run="evaluation", arena=arena, seed=options.seed + SEED_OFFSET, epochs=0), learning=False)
     agent.take_over(meta, arrays, str(path))
     with watched(), choose(fmus) as sensors, Progress(options.cap, "steps") as progress:
         found = evaluate(arena, agent, options.placements, options.seed, options.cap, sensors, progress.add)

@@ -33,7 +33,7 @@ class Loop:
 
 def train(setup: Setup, arena: Arena, seed: int, epochs: int, make: Make = built_in) -> tuple[Loop, float]:
     """Learn for `epochs` steps; the loop as it ended, and the seconds it took."""
-    loop = Loop(arena, setup.agent(World("lab", arena, seed, epochs)), seed, epochs, make=make)
+    loop = Loop(arena, setup.agent(World(run="lab", arena=arena, seed=seed, epochs=epochs)), seed, epochs, make=make)
     began = time.perf_counter()
     with Progress(epochs, "epochs") as progress:
         while not loop.simulation.finished:

@@ -96,7 +96,10 @@ def measure(
     seed += SEED_OFFSET
     physics = Physics(arena)
     starts = [physics.random_pose(np.random.default_rng((seed, number))) for number in range(placements)]
-    crowd, suite = Crowd(arena, starts), sensors.crowd(World("evaluation", arena, seed, 0), placements)
+    crowd, suite = (
+        Crowd(arena, starts),
+        sensors.crowd(World(run="evaluation", arena=arena, seed=seed, epochs=0), placements),
+    )
     steps = np.full(placements, -1)
     for step in range(cap + 1):
         readings = CrowdReadings(*suite(step, crowd.poses), crowd.front, crowd.rear)

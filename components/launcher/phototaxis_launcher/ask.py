@@ -55,7 +55,7 @@ def request(options: BusOptions, control: Control) -> ControlReply:
 def status(argv: Sequence[str]) -> int:
     about = "Say who is alive, which tick it is, who drives, how fast, and what is awaited."
     options = parse(StatusOptions, argv, "phototaxis status", about)
-    found = request(options, Control("status")).status
+    found = request(options, Control(verb="status")).status
     if options.json:
         print(msgspec.json.encode(found).decode())
     else:
@@ -66,7 +66,7 @@ def status(argv: Sequence[str]) -> int:
 def control(argv: Sequence[str]) -> int:
     about = "Pause, resume, single-step, re-pace, reset, begin anew or stop the running simulation."
     options = parse(ControlOptions, argv, "phototaxis control", about, positional=["verb"])
-    reply = request(options, Control(options.verb, speed=options.speed, seed=options.seed))
+    reply = request(options, Control(verb=options.verb, speed=options.speed, seed=options.seed))
     if not reply.ok:
         raise UserError(reply.reason)
     print("\n".join(describe(reply.status)), file=sys.stderr)

@@ -82,10 +82,10 @@ class Story(Show):
         """
         now = time.monotonic()
         if now >= self._pause_at:
-            bus.control(Control("pause"))
+            bus.control(Control(verb="pause"))
             self._step_at, self._pause_at = time.monotonic(), math.inf
         if now >= self._step_at:
-            bus.control(Control("step"))
+            bus.control(Control(verb="step"))
             self._step_at = max(self._step_at + 1 / TICKS_A_SECOND, now)
 
     def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
@@ -95,7 +95,7 @@ class Story(Show):
         if not self._paced:
             return
         if self._chapter == 0 and status.phase != "paused":
-            bus.control(Control("pause"))
+            bus.control(Control(verb="pause"))
         elif self._chapter == 0 and status.driver and not status.waiting_for:
             progress.say(SEEN)
             self._turn(progress, f"The robot knows nothing yet and wanders about, until epoch {self._fast_from}.")
@@ -103,7 +103,7 @@ class Story(Show):
         elif self._chapter == 1 and status.epoch >= self._fast_from < self._slow_from:
             self._turn(progress, f"It learns at full speed, until about epoch {self._slow_from}.")
             self._step_at = math.inf
-            bus.control(Control("resume"))
+            bus.control(Control(verb="resume"))
         elif self._chapter == 2:
             made = status.epoch - epoch
             if status.epoch + made >= self._slow_from:  # the next status would come too late

@@ -8,7 +8,7 @@ from typing import Annotated
 from msgspec import Meta
 from phototaxis.errors import UserError
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import MOST, Count, Seed
+from phototaxis.messages import MAX_ROBOTS, Count, Seed
 from phototaxis.options import Parser, add_options, convert, flags, peek
 from phototaxis.session import BusOptions
 
@@ -29,7 +29,7 @@ class UpOptions(BusOptions, kw_only=True):
     """learning steps; 0: run until stopped"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """simulated seconds per second; 0: lockstep, as fast as it goes"""
-    robots: Annotated[int, Meta(ge=1, le=MOST)] = 1
+    robots: Annotated[int, Meta(ge=1, le=MAX_ROBOTS)] = 1
     """so many robots at once, each alone in its arena; one learner drives them all, the first is recorded"""
     swap: str = ""
     """TICK:LEARNER,…: at these ticks fresh agents take over; they inherit from one of their kind, and learn in the

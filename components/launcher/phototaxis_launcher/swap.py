@@ -37,7 +37,7 @@ def main(argv: Sequence[str]) -> int:
     add_options(parser, Options, positional=["learner"])
     own, words = parser.parse_known_args(argv)
     options = convert(Options, vars(own))
-    reply = _ask(options, Launch(["--learner", options.learner, *for_ours(words)]))
+    reply = _ask(options, Launch(words=["--learner", options.learner, *for_ours(words)]))
     if reply.reason:
         raise UserError(reply.reason)
     if options.json:
@@ -54,7 +54,7 @@ def _ask(options: Options, request: Launch) -> LaunchReply:
                 f"no `phototaxis up` runs the world '{options.name}'; start the agent yourself: "
                 f"phototaxis agent --learner {options.learner} --take-over"
             )
-        now = bus.control(Control("status"))
+        now = bus.control(Control(verb="status"))
         if now is not None and (delay := what_delays(now.status)):
             print(delay, file=sys.stderr)
         reply = bus.ask_one("launch", request, timeout=options.within)

@@ -31,8 +31,9 @@ class SuiteOfMany:
         unpack(state.contact, self._robots, 2, FLAG)
         sonar, light = self._suite(state.tick, np.ascontiguousarray(poses.T))
         return ReadingsOfMany(
-            state.run, state.tick, state.epoch, state.episode, pack(sonar), pack(light), state.contact,
-            state.left, state.right, state.author, state.driver,
+            run=state.run, tick=state.tick, epoch=state.epoch, episode=state.episode, sonar=pack(sonar),
+            light=pack(light), contact=state.contact, left=state.left, right=state.right, author=state.author,
+            driver=state.driver,
         )  # fmt: skip
 
     def first(self, readings: ReadingsOfMany) -> tuple[list[float], Sequence[float]]:

@@ -95,8 +95,9 @@ class SensorSuite:
             sonar = [min(distance * factor, most) for distance, factor in zip(sonar, factors, strict=False)]
             left, right = min(left * factors[16], 1.0), min(right * factors[17], 1.0)
         return Readings(
-            state.run, state.tick, state.episode, state.epoch, sonar, (left, right),
-            state.front, state.rear, state.left, state.right, state.author, state.driver,
+            run=state.run, tick=state.tick, episode=state.episode, epoch=state.epoch, sonar=sonar, light=(left, right),
+            front=state.front, rear=state.rear, left=state.left, right=state.right, author=state.author,
+            driver=state.driver,
         )  # fmt: skip
 
     def follow(self, moment: Moment) -> None:

@@ -10,7 +10,7 @@ from phototaxis.component import ComponentOptions, entry, run
 from phototaxis.disk import try_file
 from phototaxis.errors import UserError
 from phototaxis.journal import Journal
-from phototaxis.messages import MOST, Count, Seed, run_name
+from phototaxis.messages import MAX_ROBOTS, Count, Seed, run_name
 from phototaxis.options import parse
 from phototaxis.words import WORD
 
@@ -30,7 +30,7 @@ class Options(ComponentOptions, kw_only=True):
     """name of the run (default: date, time and a few random letters)"""
     patience: Annotated[float, Meta(gt=0)] = 5.0
     """seconds after which a driver that is there but silent loses the seat, if somebody else waits for it"""
-    robots: Annotated[int, Meta(ge=1, le=MOST)] = 1
+    robots: Annotated[int, Meta(ge=1, le=MAX_ROBOTS)] = 1
     """so many robots at once, each alone in its arena, placed as with the seeds from `seed` on"""
     journal: str = ""
     """file that lets a killed simulation continue its run (of one robot)"""

@@ -43,7 +43,7 @@ class SimulationOfMany:
         seeds: Sequence[int] | None = None,
         starts: Mapping[int, Pose] | None = None,
     ):
-        self.world = World(run, arena, seed, epochs, robots)
+        self.world = World(run=run, arena=arena, seed=seed, epochs=epochs, robots=robots)
         self._seeds = [seed + row for row in range(robots)] if seeds is None else list(seeds)
         self._given = dict(starts or {})
         self._physics = Physics(arena)
@@ -89,8 +89,13 @@ class SimulationOfMany:
 
     def _ending(self, end: End, author: str) -> Episode | None:
         """The first robot's episode, if it ends now."""
-        run, number, steps = self.world.run, int(self.episode[0]), self.tick - self._began
-        return Episode(run, number, self.tick, steps, end, author, *self._start) if end else None
+        if not end:
+            return None
+        x, y, heading = self._start
+        return Episode(
+            run=self.world.run, episode=int(self.episode[0]), tick=self.tick, steps=self.tick - self._began,
+            end=end, driver=author, x=x, y=y, heading=heading,
+        )  # fmt: skip
 
     def snapshot(self, recent: list[bool], driver: str) -> None:
         """Nothing: a run of many robots cannot be continued."""
@@ -140,9 +145,10 @@ class SimulationOfMany:
         """The first robot, for people to watch."""
         state, (x, y, heading) = self.state, self.poses[0].tolist()
         return State(
-            state.run, state.tick, int(self.episode[0]), state.epoch, state.time, x, y, heading, 0.0, 0.0,
-            bool(self.front[0]), bool(self.rear[0]), float(self._motors[0][0]), float(self._motors[1][0]),
-            state.author, state.driver, state.hash,
+            run=state.run, tick=state.tick, episode=int(self.episode[0]), epoch=state.epoch, time=state.time, x=x, y=y,
+            heading=heading, speed=0.0, turn=0.0, front=bool(self.front[0]), rear=bool(self.rear[0]),
+            left=float(self._motors[0][0]), right=float(self._motors[1][0]), author=state.author, driver=state.driver,
+            hash=state.hash,
         )  # fmt: skip
 
     def _column(self, given: bytes | float) -> np.ndarray:
@@ -161,17 +167,15 @@ class SimulationOfMany:
         )
 
     def _report(self, author: str) -> StateOfMany:
-        left, right = self._motors
-        columns = (
-            pack(self.episode, COUNT), pack(self.poses.T), pack(np.stack([self.front, self.rear]), FLAG),
-            pack(left), pack(right),
-        )  # fmt: skip
+        episode, pose = pack(self.episode, COUNT), pack(self.poses.T)
+        contact, (left, right) = pack(np.stack([self.front, self.rear]), FLAG), map(pack, self._motors)
         digest = hashlib.blake2b(self._chain, digest_size=8)
-        for column in (pack(np.array([self.tick, self.epoch]), COUNT), *columns):
+        for column in (pack(np.array([self.tick, self.epoch]), COUNT), episode, pose, contact, left, right):
             digest.update(column)
         self._chain = digest.digest()
         seconds = self.tick * self.world.arena.motion.control_period
         self.state = StateOfMany(
-            self.world.run, self.tick, self.epoch, seconds, *columns, author, "", digest.hexdigest()
-        )
+            run=self.world.run, tick=self.tick, epoch=self.epoch, time=seconds, episode=episode, pose=pose,
+            contact=contact, left=left, right=right, author=author, driver="", hash=digest.hexdigest(),
+        )  # fmt: skip
         return self.state

@@ -114,7 +114,7 @@ class Seat:
         if agent in self.standbys:
             self.standbys.remove(agent)
         self.driver, self.heir = agent, ""
-        self.history = [*self.history, Seating(agent, tick, how)][-KEPT:]
+        self.history = [*self.history, Seating(driver=agent, tick=tick, how=how)][-KEPT:]
 
 
 def _named(agent: str) -> None:

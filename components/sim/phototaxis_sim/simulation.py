@@ -57,7 +57,7 @@ class Simulation:
     """
 
     def __init__(self, arena: Arena, seed: int, run: str, epochs: int = 0, start: Pose | None = None):
-        self.world, self.digest = World(run, arena, seed, epochs), arena.digest
+        self.world, self.digest = World(run=run, arena=arena, seed=seed, epochs=epochs), arena.digest
         self.ended: Episode | None = None
         self.episodes = self.reached = 0
         self._physics = Physics(arena)
@@ -102,7 +102,11 @@ class Simulation:
         self.ended = None
         self._tick += 1
         if end:
-            self.ended = Episode(self.world.run, self._episode, self._tick - 1, self._steps, end, author, *self._start)
+            x, y, heading = self._start
+            self.ended = Episode(
+                run=self.world.run, episode=self._episode, tick=self._tick - 1, steps=self._steps, end=end,
+                driver=author, x=x, y=y, heading=heading,
+            )  # fmt: skip
             self.episodes += 1
             self.reached += end == "reached"
             self._idle = self._idle + 1 if end == "reached" and not self._steps else 0
@@ -159,6 +163,7 @@ class Simulation:
         digest = hashlib.blake2b(packed, digest_size=8)
         self._chain = digest.digest()
         return State(
-            self.world.run, tick, episode, epoch, tick * self._period, x, y, heading, speed, turn,
-            front, rear, left, right, author, "", digest.hexdigest(),
+            run=self.world.run, tick=tick, episode=episode, epoch=epoch, time=tick * self._period, x=x, y=y,
+            heading=heading, speed=speed, turn=turn, front=front, rear=rear, left=left, right=right, author=author,
+            driver="", hash=digest.hexdigest(),
         )  # fmt: skip
