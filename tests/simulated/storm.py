@@ -69,7 +69,7 @@ class Storm:
             raise Broken("the state's hash is another than in one process")
         if any(author != driver for author, driver in system.asker.applied):
             raise Broken("a command was applied that was not the driver's")
-        driver = system.names[system.asker.seat.driver or system.asker.applied[-1][0]]
+        driver = system.asker.seat.driver or system.asker.applied[-1][0]
         if load(system.checkpoint(driver))[0].learner_hash != learner_hash:
             raise Broken("what was learned is another than in one process")
         self.counts.update({name: count for name, count in system.network.counts.items() if name != "sent"})

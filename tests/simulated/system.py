@@ -44,13 +44,11 @@ class System:
         self.network = Network(self.timeline, self.rng, Weather())
         self._folder, self._setup, self._starts = folder, setup, 0
         self.asker = Asker(Simulation(arena, world_seed, "run", epochs))
-        self.names: dict[str, str] = {}
-        """Of each agent that was ever started, by its ident on the bus."""
         self._process("sim").start(self.asker)
 
-    def _process(self, role: str) -> Process:
+    def _process(self, role: str, ident: str = "") -> Process:
         self._starts += 1
-        return Process(self.network, role, f"{role}-{self._starts}", self.witness.carried)
+        return Process(self.network, role, ident or f"{role}-{self._starts}", self.witness.carried)
 
     def sensors(self) -> Process:
         """Start the sensors."""
@@ -65,17 +63,16 @@ class System:
 
     def agent(self, name: str, mode: Mode = "claim", at: int = 0, restarted: bool = False) -> Process:
         """Start an agent, or start it again from what it left on disk."""
-        process, path = self._process("agent"), self.checkpoint(name)
+        process, path = self._process("agent", name), self.checkpoint(name)
         journal = Journal(path.with_suffix(".journal"))
         found = kept.read(path if restarted else None, False, journal)
 
         def make(world):
             return watch_learning(self._setup.agent(world))
 
-        self.names[process.ident] = name
-        client = AgentClient(process.ident, make, found, True, mode, at)
+        client = AgentClient(name, make, found, True, mode, at)
         if restarted:
-            self.witness.restarted(process.ident, _kept_tick(found))
+            self.witness.restarted(name, _kept_tick(found))
         log = Chunks(process, "log/agent", AgentLogs(process.ident))
         process.start(client, journal, Store(journal, path), log)
         return process
