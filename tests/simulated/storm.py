@@ -13,6 +13,7 @@ from typing import Any
 import joblib
 import msgspec
 from phototaxis.checkpoint import load
+from phototaxis.errors import UserError
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab.loop import train
 from phototaxis_sim import arenas
@@ -23,6 +24,8 @@ from simulated.schedule import Fault, Schedule, make
 from simulated.system import BACK_AFTER_S, System
 from simulated.witness import Broken
 
+BEGINS_AFTER_S = 0.0005
+"""Seconds after which a fault begins in its tick: some of its messages are on their way."""
 LIMIT_S = 600.0
 """Virtual seconds within which every run ends."""
 
@@ -61,7 +64,8 @@ class Storm:
             when an invariant does not hold, the run does not end, or ends otherwise than in one process.
         """
         system, schedule = self._system, self._schedule
-        system.timeline.after(0.001, self._watch)
+        system.witness.on_tick = self._begin_at
+        system.timeline.after(BACK_AFTER_S, self._watch)
         if not system.finish(LIMIT_S):
             raise Broken(f"the run stands at tick {system.asker.simulation.state.tick} after {LIMIT_S:g} s")
         state_hash, learner_hash, ticks = reference(schedule.world, schedule.epochs)
@@ -76,17 +80,20 @@ class Storm:
         return ticks
 
     def _watch(self) -> None:
-        """Begin the faults whose tick has come, and start again what has died."""
+        """Start again what has died."""
         system = self._system
-        while self._faults and self._faults[0].tick <= system.asker.simulation.state.tick:
-            self._begin(self._faults.pop(0))
         if self._sensors.dead:
             self._sensors = system.sensors()
         if self._agent.dead and not system.asker.finished:
             mode = "claim" if len(self._names) == 1 else "take over"
             self._agent = system.agent(self._names[-1], mode, restarted=True)
         if not system.asker.finished:
-            system.timeline.after(BACK_AFTER_S if not self._faults else 0.0007, self._watch)
+            system.timeline.after(BACK_AFTER_S, self._watch)
+
+    def _begin_at(self, tick: int) -> None:
+        """Begin the faults of a tick a moment after it is first asked for."""
+        while self._faults and self._faults[0].tick <= tick:
+            self._system.timeline.after(BEGINS_AFTER_S, self._begin, self._faults.pop(0))
 
     def _begin(self, fault: Fault) -> None:
         self.counts[fault.kind] += 1
@@ -109,12 +116,15 @@ class Storm:
 
 
 def run(schedule: Schedule) -> tuple[str, int, Counter[str]]:
-    """What is wrong ("" for nothing), the ticks, and the faults by kind."""
+    """What is wrong ("" for nothing), the ticks, and the faults by kind.
+
+    Wrong is what breaks an invariant or is told to users as an error; any other exception is a defect of the harness.
+    """
     with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:  # noqa: S108
         try:
             storm = Storm(schedule, Path(folder))
             return "", storm.run(), storm.counts
-        except Exception as error:
+        except (Broken, UserError) as error:
             return f"{type(error).__name__}: {error}", 0, Counter()
 
 

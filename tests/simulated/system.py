@@ -4,18 +4,16 @@ from functools import partial
 from pathlib import Path
 from random import Random
 
-import msgspec
 from phototaxis.arena import Arena
 from phototaxis.chunks import Chunks
 from phototaxis.journal import Journal
-from phototaxis.messages import Readings
 from phototaxis.seat_client import Mode
 from phototaxis.store import Store
 from phototaxis_agent import kept
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.rows import AgentLogs
 from phototaxis_agent.setup import Setup
-from phototaxis_sensors.choice import BuiltInChoice, make_suite
+from phototaxis_sensors.choice import make_suite
 from phototaxis_sensors.sensing import Sensing
 from phototaxis_sensors.server import chunk
 from phototaxis_sim.simulation import Simulation
@@ -23,6 +21,7 @@ from phototaxis_sim.simulation import Simulation
 from simulated.asker import Asker
 from simulated.network import Network, Weather
 from simulated.process import Process
+from simulated.sensing import RememberedChoice
 from simulated.timeline import Timeline
 from simulated.witness import Witness, watch_learning
 
@@ -54,7 +53,7 @@ class System:
         """Start the sensors."""
         process = self._process("sensors")
         log = Chunks(process, "log/sensors", partial(chunk, process.ident))
-        process.start(Sensing(partial(make_suite, BuiltInChoice())), log=log)
+        process.start(Sensing(partial(make_suite, RememberedChoice())), log=log)
         return process
 
     def checkpoint(self, name: str) -> Path:
@@ -72,7 +71,7 @@ class System:
 
         client = AgentClient(name, make, found, True, mode, at)
         if restarted:
-            self.witness.restarted(name, _kept_tick(found))
+            self.witness.restarted(name, found)
         log = Chunks(process, "log/agent", AgentLogs(process.ident))
         process.start(client, journal, Store(journal, path), log)
         return process
@@ -83,9 +82,3 @@ class System:
         self.network.weather = Weather()
         self.timeline.run(lambda: False, 1.0)
         return done
-
-
-def _kept_tick(found: kept.Kept) -> int:
-    """The newest tick on disk."""
-    ticks = [msgspec.msgpack.decode(frame, type=Readings).tick for frame in found.frames[1:]]
-    return max([-1 if found.checkpoint is None else found.checkpoint[0].tick, *ticks])
