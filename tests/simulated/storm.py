@@ -6,6 +6,7 @@
 import tempfile
 import time
 from collections import Counter
+from copy import deepcopy
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ import joblib
 import msgspec
 from phototaxis.checkpoint import load
 from phototaxis.errors import UserError
+from phototaxis.messages import World
+from phototaxis_agent.agent import Agent
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab.loop import train
 from phototaxis_sim import arenas
@@ -28,6 +31,17 @@ BEGINS_AFTER_S = 0.0005
 """Seconds after which a fault begins in its tick: some of its messages are on their way."""
 LIMIT_S = 600.0
 """Virtual seconds within which every run ends."""
+
+
+@cache
+def _fresh(world: bytes) -> Agent:
+    """An agent that has learned nothing."""
+    return make_setup().agent(msgspec.msgpack.decode(world, type=World))
+
+
+def fresh(world: World) -> Agent:
+    """An agent that has learned nothing, from a copy: to look its learner up takes longer than a run's twenty ticks."""
+    return deepcopy(_fresh(msgspec.msgpack.encode(world)))
 
 
 @cache
@@ -50,7 +64,7 @@ class Storm:
         self.counts: Counter[str] = Counter()
         self._schedule, self._faults = schedule, list(schedule.faults)
         arena = arenas.load("paper")
-        self._system = System(folder, schedule.seed, arena, make_setup(), schedule.world, schedule.epochs)
+        self._system = System(folder, schedule.seed, arena, fresh, schedule.world, schedule.epochs)
         self._system.network.weather = msgspec.structs.replace(schedule.weather)
         self._names = ["agent"]
         self._sensors, self._agent = self._system.sensors(), self._system.agent("agent")

@@ -1,5 +1,6 @@
 """A whole system on the simulated network: real sensors and agents, and what starts them again when they die."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -7,12 +8,13 @@ from random import Random
 from phototaxis.arena import Arena
 from phototaxis.chunks import Chunks
 from phototaxis.journal import Journal
+from phototaxis.messages import World
 from phototaxis.seat_client import Mode
 from phototaxis.store import Store
 from phototaxis_agent import kept
+from phototaxis_agent.agent import Agent
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.rows import AgentLogs
-from phototaxis_agent.setup import Setup
 from phototaxis_sensors.choice import make_suite
 from phototaxis_sensors.sensing import Sensing
 from phototaxis_sensors.server import chunk
@@ -36,12 +38,15 @@ class System:
     ----------
     folder : where agents keep their checkpoints and journals.
     seed : of all faults; the world has a seed of its own.
+    make : makes an agent that has learned nothing.
     """
 
-    def __init__(self, folder: Path, seed: int, arena: Arena, setup: Setup, world_seed: int, epochs: int):
+    def __init__(
+        self, folder: Path, seed: int, arena: Arena, make: Callable[[World], Agent], world_seed: int, epochs: int
+    ):
         self.timeline, self.rng, self.witness = Timeline(), Random(seed), Witness()
         self.network = Network(self.timeline, self.rng, Weather())
-        self._folder, self._setup, self._starts = folder, setup, 0
+        self._folder, self._make, self._starts = folder, make, 0
         self.asker = Asker(Simulation(arena, world_seed, "run", epochs))
         self._process("sim").start(self.asker)
 
@@ -67,7 +72,7 @@ class System:
         found = kept.read(path if restarted else None, False, journal)
 
         def make(world):
-            return watch_learning(self._setup.agent(world))
+            return watch_learning(self._make(world))
 
         client = AgentClient(name, make, found, True, mode, at)
         if restarted:

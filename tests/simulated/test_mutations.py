@@ -6,7 +6,7 @@ from simulated.mutations import MUTATIONS
 from simulated.schedule import make
 from simulated.storm import run
 
-SEEDS = 40
+SEEDS = 200
 
 
 @pytest.mark.parametrize("mutation", MUTATIONS, ids=lambda mutation: mutation.about)
