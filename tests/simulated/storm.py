@@ -6,6 +6,7 @@
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
@@ -142,6 +143,12 @@ def run(schedule: Schedule) -> tuple[str, int, Counter[str]]:
             return f"{type(error).__name__}: {error}", 0, Counter()
 
 
+def results(seeds: range) -> Iterator[tuple[int, tuple[str, int, Counter[str]]]]:
+    """Each seed with what `run` says of its schedule, on all cores."""
+    parallel: Any = joblib.Parallel  # its stubs know neither numbers for batch_size nor generators
+    return parallel(n_jobs=-1, batch_size=8, return_as="generator")(joblib.delayed(_numbered)(s) for s in seeds)
+
+
 def _numbered(seed: int) -> tuple[int, tuple[str, int, Counter[str]]]:
     return seed, run(make(seed))
 
@@ -159,9 +166,7 @@ def main(words: list[str]) -> int:
     first, _, last = (words[0] if words else "0:200").partition(":")
     seeds = range(int(first), int(last) if last else int(first) + 1)
     began, ticks, failed, faults = time.perf_counter(), 0, 0, Counter[str]()
-    parallel: Any = joblib.Parallel  # its stubs know neither numbers for batch_size nor generators
-    work = parallel(n_jobs=-1, batch_size=8, return_as="generator")(joblib.delayed(_numbered)(s) for s in seeds)
-    for seed, (wrong, made, counts) in tqdm(work, total=len(seeds), unit=" schedules"):
+    for seed, (wrong, made, counts) in tqdm(results(seeds), total=len(seeds), unit=" schedules"):
         ticks, faults = ticks + made, faults + counts
         if wrong:
             failed += 1
