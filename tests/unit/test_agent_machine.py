@@ -710,3 +710,13 @@ def test_many_robots_are_driven_by_the_same_machine(world):
     heir.give(Event("crowd/readings", readings))
     with pytest.raises(UserError, match="a standby keeps in step with the driver of one robot; this world has 3"):
         heir.answer(many)
+
+
+def test_what_is_inherited_replaces_what_was_remembered(world):
+    driver, heir, play = Desk(world), Desk(world), Play(world)
+    play.drive(driver, 3)
+    Play(world).drive(heir, 2)
+    assert driver.machine.agent is not None
+    assert heir.machine.agent is not None
+    heir.machine.agent.restore(*driver.machine.agent.checkpoint(), "a")
+    assert heir.checkpoint() == driver.checkpoint()
