@@ -6,6 +6,8 @@
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
+from copy import deepcopy
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,9 @@ from typing import Any
 import joblib
 import msgspec
 from phototaxis.checkpoint import load
+from phototaxis.errors import UserError
+from phototaxis.messages import World
+from phototaxis_agent.agent import Agent
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab.loop import train
 from phototaxis_sim import arenas
@@ -23,8 +28,21 @@ from simulated.schedule import Fault, Schedule, make
 from simulated.system import BACK_AFTER_S, System
 from simulated.witness import Broken
 
+BEGINS_AFTER_S = 0.0005
+"""Seconds after which a fault begins in its tick: some of its messages are on their way."""
 LIMIT_S = 600.0
 """Virtual seconds within which every run ends."""
+
+
+@cache
+def _fresh(world: bytes) -> Agent:
+    """An agent that has learned nothing."""
+    return make_setup().agent(msgspec.msgpack.decode(world, type=World))
+
+
+def fresh(world: World) -> Agent:
+    """An agent that has learned nothing, from a copy: to look its learner up takes longer than a run's twenty ticks."""
+    return deepcopy(_fresh(msgspec.msgpack.encode(world)))
 
 
 @cache
@@ -47,7 +65,7 @@ class Storm:
         self.counts: Counter[str] = Counter()
         self._schedule, self._faults = schedule, list(schedule.faults)
         arena = arenas.load("paper")
-        self._system = System(folder, schedule.seed, arena, make_setup(), schedule.world, schedule.epochs)
+        self._system = System(folder, schedule.seed, arena, fresh, schedule.world, schedule.epochs)
         self._system.network.weather = msgspec.structs.replace(schedule.weather)
         self._names = ["agent"]
         self._sensors, self._agent = self._system.sensors(), self._system.agent("agent")
@@ -61,7 +79,8 @@ class Storm:
             when an invariant does not hold, the run does not end, or ends otherwise than in one process.
         """
         system, schedule = self._system, self._schedule
-        system.timeline.after(0.001, self._watch)
+        system.witness.on_tick = self._begin_at
+        system.timeline.after(BACK_AFTER_S, self._watch)
         if not system.finish(LIMIT_S):
             raise Broken(f"the run stands at tick {system.asker.simulation.state.tick} after {LIMIT_S:g} s")
         state_hash, learner_hash, ticks = reference(schedule.world, schedule.epochs)
@@ -69,24 +88,27 @@ class Storm:
             raise Broken("the state's hash is another than in one process")
         if any(author != driver for author, driver in system.asker.applied):
             raise Broken("a command was applied that was not the driver's")
-        driver = system.names[system.asker.seat.driver or system.asker.applied[-1][0]]
+        driver = system.asker.seat.driver or system.asker.applied[-1][0]
         if load(system.checkpoint(driver))[0].learner_hash != learner_hash:
             raise Broken("what was learned is another than in one process")
         self.counts.update({name: count for name, count in system.network.counts.items() if name != "sent"})
         return ticks
 
     def _watch(self) -> None:
-        """Begin the faults whose tick has come, and start again what has died."""
+        """Start again what has died."""
         system = self._system
-        while self._faults and self._faults[0].tick <= system.asker.simulation.state.tick:
-            self._begin(self._faults.pop(0))
         if self._sensors.dead:
             self._sensors = system.sensors()
         if self._agent.dead and not system.asker.finished:
             mode = "claim" if len(self._names) == 1 else "take over"
             self._agent = system.agent(self._names[-1], mode, restarted=True)
         if not system.asker.finished:
-            system.timeline.after(BACK_AFTER_S if not self._faults else 0.0007, self._watch)
+            system.timeline.after(BACK_AFTER_S, self._watch)
+
+    def _begin_at(self, tick: int) -> None:
+        """Begin the faults of a tick a moment after it is first asked for."""
+        while self._faults and self._faults[0].tick <= tick:
+            self._system.timeline.after(BEGINS_AFTER_S, self._begin, self._faults.pop(0))
 
     def _begin(self, fault: Fault) -> None:
         self.counts[fault.kind] += 1
@@ -109,13 +131,22 @@ class Storm:
 
 
 def run(schedule: Schedule) -> tuple[str, int, Counter[str]]:
-    """What is wrong ("" for nothing), the ticks, and the faults by kind."""
+    """What is wrong ("" for nothing), the ticks, and the faults by kind.
+
+    Wrong is what breaks an invariant or is told to users as an error; any other exception is a defect of the harness.
+    """
     with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:  # noqa: S108
         try:
             storm = Storm(schedule, Path(folder))
             return "", storm.run(), storm.counts
-        except Exception as error:
+        except (Broken, UserError) as error:
             return f"{type(error).__name__}: {error}", 0, Counter()
+
+
+def results(seeds: range) -> Iterator[tuple[int, tuple[str, int, Counter[str]]]]:
+    """Each seed with what `run` says of its schedule, on all cores."""
+    parallel: Any = joblib.Parallel  # its stubs know neither numbers for batch_size nor generators
+    return parallel(n_jobs=-1, batch_size=8, return_as="generator")(joblib.delayed(_numbered)(s) for s in seeds)
 
 
 def _numbered(seed: int) -> tuple[int, tuple[str, int, Counter[str]]]:
@@ -135,9 +166,7 @@ def main(words: list[str]) -> int:
     first, _, last = (words[0] if words else "0:200").partition(":")
     seeds = range(int(first), int(last) if last else int(first) + 1)
     began, ticks, failed, faults = time.perf_counter(), 0, 0, Counter[str]()
-    parallel: Any = joblib.Parallel  # its stubs know neither numbers for batch_size nor generators
-    work = parallel(n_jobs=-1, batch_size=8, return_as="generator")(joblib.delayed(_numbered)(s) for s in seeds)
-    for seed, (wrong, made, counts) in tqdm(work, total=len(seeds), unit=" schedules"):
+    for seed, (wrong, made, counts) in tqdm(results(seeds), total=len(seeds), unit=" schedules"):
         ticks, faults = ticks + made, faults + counts
         if wrong:
             failed += 1

@@ -1,21 +1,21 @@
 """A whole system on the simulated network: real sensors and agents, and what starts them again when they die."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from random import Random
 
-import msgspec
 from phototaxis.arena import Arena
 from phototaxis.chunks import Chunks
 from phototaxis.journal import Journal
-from phototaxis.messages import Readings
+from phototaxis.messages import World
 from phototaxis.seat_client import Mode
 from phototaxis.store import Store
 from phototaxis_agent import kept
+from phototaxis_agent.agent import Agent
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.rows import AgentLogs
-from phototaxis_agent.setup import Setup
-from phototaxis_sensors.choice import BuiltInChoice, make_suite
+from phototaxis_sensors.choice import make_suite
 from phototaxis_sensors.sensing import Sensing
 from phototaxis_sensors.server import chunk
 from phototaxis_sim.simulation import Simulation
@@ -23,6 +23,7 @@ from phototaxis_sim.simulation import Simulation
 from simulated.asker import Asker
 from simulated.network import Network, Weather
 from simulated.process import Process
+from simulated.sensing import RememberedChoice
 from simulated.timeline import Timeline
 from simulated.witness import Witness, watch_learning
 
@@ -37,26 +38,27 @@ class System:
     ----------
     folder : where agents keep their checkpoints and journals.
     seed : of all faults; the world has a seed of its own.
+    make : makes an agent that has learned nothing.
     """
 
-    def __init__(self, folder: Path, seed: int, arena: Arena, setup: Setup, world_seed: int, epochs: int):
+    def __init__(
+        self, folder: Path, seed: int, arena: Arena, make: Callable[[World], Agent], world_seed: int, epochs: int
+    ):
         self.timeline, self.rng, self.witness = Timeline(), Random(seed), Witness()
         self.network = Network(self.timeline, self.rng, Weather())
-        self._folder, self._setup, self._starts = folder, setup, 0
+        self._folder, self._make, self._starts = folder, make, 0
         self.asker = Asker(Simulation(arena, world_seed, "run", epochs))
-        self.names: dict[str, str] = {}
-        """Of each agent that was ever started, by its ident on the bus."""
         self._process("sim").start(self.asker)
 
-    def _process(self, role: str) -> Process:
+    def _process(self, role: str, ident: str = "") -> Process:
         self._starts += 1
-        return Process(self.network, role, f"{role}-{self._starts}", self.witness.carried)
+        return Process(self.network, role, ident or f"{role}-{self._starts}", self.witness.carried)
 
     def sensors(self) -> Process:
         """Start the sensors."""
         process = self._process("sensors")
         log = Chunks(process, "log/sensors", partial(chunk, process.ident))
-        process.start(Sensing(partial(make_suite, BuiltInChoice())), log=log)
+        process.start(Sensing(partial(make_suite, RememberedChoice())), log=log)
         return process
 
     def checkpoint(self, name: str) -> Path:
@@ -65,17 +67,16 @@ class System:
 
     def agent(self, name: str, mode: Mode = "claim", at: int = 0, restarted: bool = False) -> Process:
         """Start an agent, or start it again from what it left on disk."""
-        process, path = self._process("agent"), self.checkpoint(name)
+        process, path = self._process("agent", name), self.checkpoint(name)
         journal = Journal(path.with_suffix(".journal"))
         found = kept.read(path if restarted else None, False, journal)
 
         def make(world):
-            return watch_learning(self._setup.agent(world))
+            return watch_learning(self._make(world))
 
-        self.names[process.ident] = name
-        client = AgentClient(process.ident, make, found, True, mode, at)
+        client = AgentClient(name, make, found, True, mode, at)
         if restarted:
-            self.witness.restarted(process.ident, _kept_tick(found))
+            self.witness.restarted(name, found)
         log = Chunks(process, "log/agent", AgentLogs(process.ident))
         process.start(client, journal, Store(journal, path), log)
         return process
@@ -86,9 +87,3 @@ class System:
         self.network.weather = Weather()
         self.timeline.run(lambda: False, 1.0)
         return done
-
-
-def _kept_tick(found: kept.Kept) -> int:
-    """The newest tick on disk."""
-    ticks = [msgspec.msgpack.decode(frame, type=Readings).tick for frame in found.frames[1:]]
-    return max([-1 if found.checkpoint is None else found.checkpoint[0].tick, *ticks])

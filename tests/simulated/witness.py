@@ -1,11 +1,13 @@
 """What must hold at every event, whatever the schedule does."""
 
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
 from phototaxis import machine as m
-from phototaxis.messages import Readings
+from phototaxis.messages import Readings, State
 from phototaxis_agent.agent import Agent
+from phototaxis_agent.keeping import Kept
 
 from simulated.process import Process
 
@@ -20,9 +22,15 @@ class Witness:
     - The answer of a process to a tick never changes.
     - An agent that keeps a journal has written a tick down before it answers it.
     - An agent learns from each tick once, and in order.
+    - What an agent finds in its journal are whole entries.
+
+    Attributes
+    ----------
+    on_tick : is told each tick that the simulation asks for.
     """
 
     def __init__(self) -> None:
+        self.on_tick: Callable[[int], object] = lambda tick: None
         self.answers: dict[tuple[str, str, int, str], Any] = {}
         self._kept: dict[str, int] = {}
 
@@ -32,6 +40,8 @@ class Witness:
             self._kept[process.ident] = msgspec.msgpack.decode(effect.entry, type=Readings).tick
         elif process.role == "agent" and isinstance(effect, m.Save):
             self._kept[process.ident] = max(effect.meta.tick, self._kept.get(process.ident, -1))
+        elif isinstance(effect, m.Publish) and isinstance(effect.message, State):
+            self.on_tick(effect.message.tick)
         elif isinstance(effect, m.Publish) and effect.topic in ("readings", "command"):
             self._answered(process, effect.topic, effect.message)
 
@@ -43,9 +53,13 @@ class Witness:
         if topic == "command" and self._kept.get(process.ident, -1) < message.tick:
             raise Broken(f"{process.ident} answers tick {message.tick} before it is in the journal")
 
-    def restarted(self, ident: str, kept: int) -> None:
-        """A process goes on from a disk that holds its former self's ticks up to `kept`."""
-        self._kept[ident] = kept
+    def restarted(self, ident: str, found: Kept) -> None:
+        """A process goes on from what its former self left on disk."""
+        try:
+            ticks = [msgspec.msgpack.decode(frame, type=Readings).tick for frame in found.frames[1:]]
+        except msgspec.DecodeError:
+            raise Broken(f"{ident} takes a part of an entry for a whole one") from None
+        self._kept[ident] = max([-1 if found.checkpoint is None else found.checkpoint[0].tick, *ticks])
 
 
 def watch_learning(agent: Agent) -> Agent:

@@ -1,5 +1,6 @@
 """The agent's machine without a bus: joins, answers once, follows, inherits, keeps itself, leaves."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,7 @@ from phototaxis.errors import Unavailable, UserError
 from phototaxis.journal import GIVEN_UP, Journal
 from phototaxis.machine import (
     STOP,
+    TIME,
     Answer,
     Append,
     Ask,
@@ -44,6 +46,7 @@ from phototaxis.seat_client import Place
 from phototaxis.store import Store
 from phototaxis_agent import kept
 from phototaxis_agent.client import AgentClient
+from phototaxis_agent.following import ASK_AGAIN_S, INHERIT_WITHIN_S
 from phototaxis_agent.keeping import SAVE_EVERY_S, Kept
 from phototaxis_agent.rows import AgentLogs
 from phototaxis_agent.setup import Setup, make_setup
@@ -500,6 +503,23 @@ def test_a_standby_whose_driver_does_not_answer_learns_in_its_shadow_and_asks_ag
     assert heir.machine.seat.place is Place.IN_STEP
 
 
+def test_a_standby_whose_question_for_the_kind_is_lost_asks_for_it_again(world):
+    driver, play = Desk(world), Play(world)
+    heir = Desk(world, mode="stand by", ident="b")
+    follow(world, play, driver, heir)
+    heir.answer()
+    assert heir.machine.seat.place is Place.SHADOWING
+    play.drive(driver, 3, heir)
+    assert heir.asked == []
+    heir.now += INHERIT_WITHIN_S
+    play.drive(driver, 1, heir)
+    assert heir.asked[-1].request.probe
+    hand_over(driver, heir)
+    hand_over(driver, heir)
+    assert heir.machine.seat.place is Place.IN_STEP
+    assert "inherited nothing" not in heir.said()
+
+
 def taker(world: World, **options) -> Desk:
     return Desk(world, mode="take over", ident="b", **options)
 
@@ -521,6 +541,85 @@ def test_a_taker_over_inherits_when_it_sits_down(world):
     play.apply(heir.commands()[-1])
     play.drive(heir, 20, driver="b")
     assert digest(heir.checkpoint()) == alone(world, play.simulation.state.tick)
+
+
+def test_readings_that_were_overtaken_do_not_unseat_who_has_inherited(world):
+    driver, heir, play = Desk(world), taker(world), Play(world)
+    follow(world, play, driver, heir)
+    hand_over(driver, heir)
+    play.drive(driver, 5, heir)
+    overtaken, readings = play.readings("a"), play.readings("b")
+    heir.read(overtaken)
+    heir.read(readings)
+    hand_over(driver, heir)
+    for stale in (overtaken, msgspec.structs.replace(overtaken, tick=overtaken.tick - 1), overtaken):
+        assert heir.read(stale) == []
+        assert heir.machine.seat.place is Place.DRIVING
+        assert kinds(heir.read(readings)) == [Publish], "the same answer as before"
+    play.apply(heir.commands()[-1])
+    play.drive(heir, 20, driver="b")
+    assert digest(heir.checkpoint()) == alone(world, play.simulation.state.tick)
+
+
+def test_a_lost_question_for_what_the_predecessor_knows_is_put_again(world):
+    driver, heir, play = Desk(world), taker(world), Play(world)
+    follow(world, play, driver, heir)
+    hand_over(driver, heir)
+    play.drive(driver, 5, heir)
+    heir.asked.clear()
+    heir.read(play.readings("b"))
+    assert heir.machine.deadline == heir.now + ASK_AGAIN_S
+    assert heir.give(TIME) == [], "not yet"
+    began = heir.now
+    while heir.machine.deadline < math.inf:
+        heir.now = heir.machine.deadline
+        (again,) = heir.give(TIME)
+        assert isinstance(again, Ask)
+        assert heir.now + again.timeout == began + INHERIT_WITHIN_S
+    assert len(heir.asked) == INHERIT_WITHIN_S / ASK_AGAIN_S
+    hand_over(driver, heir)
+    play.apply(heir.commands()[-1])
+    assert heir.answer() == [], "the other questions are of no interest any more"
+    play.drive(heir, 20, driver="b")
+    assert digest(heir.checkpoint()) == alone(world, play.simulation.state.tick)
+
+
+def test_a_predecessor_that_is_gone_is_asked_once(world):
+    driver, heir, play = Desk(world), taker(world), Play(world)
+    follow(world, play, driver, heir)
+    hand_over(driver, heir)
+    play.drive(driver, 5, heir)
+    heir.asked.clear()
+    heir.read(play.readings("b"))
+    heir.answer()
+    assert "inherited nothing: a does not answer" in heir.said()
+    assert (heir.asked, heir.machine.deadline, len(heir.commands())) == ([], math.inf, 1)
+
+
+@pytest.mark.parametrize("named", ["", "b"])
+def test_who_died_before_it_inherited_asks_the_last_author_when_it_is_back(world, named):
+    """The seat is free, or readings still name its former self."""
+    driver, play = Desk(world), Play(world)
+    play.drive(driver, 40)
+    driver.read(play.readings("b"))
+    again = taker(world)
+    again.read(play.readings(named))
+    again.read(play.readings("b"))
+    hand_over(driver, again)
+    play.apply(again.commands()[-1])
+    play.drive(again, 20, driver="b")
+    assert digest(again.checkpoint()) == alone(world, play.simulation.state.tick)
+
+
+def test_who_has_driven_last_asks_nobody(world):
+    driver, heir, play = Desk(world), taker(world), Play(world)
+    follow(world, play, driver, heir)
+    hand_over(driver, heir)
+    play.drive(driver, 5, heir)
+    heir.asked.clear()
+    heir.read(play.readings("b"), author="b")
+    assert heir.asked == []
+    assert heir.commands()
 
 
 def test_behind_an_agent_of_another_kind_it_learns_from_what_that_one_does(world):
@@ -611,3 +710,13 @@ def test_many_robots_are_driven_by_the_same_machine(world):
     heir.give(Event("crowd/readings", readings))
     with pytest.raises(UserError, match="a standby keeps in step with the driver of one robot; this world has 3"):
         heir.answer(many)
+
+
+def test_what_is_inherited_replaces_what_was_remembered(world):
+    driver, heir, play = Desk(world), Desk(world), Play(world)
+    play.drive(driver, 3)
+    Play(world).drive(heir, 2)
+    assert driver.machine.agent is not None
+    assert heir.machine.agent is not None
+    heir.machine.agent.restore(*driver.machine.agent.checkpoint(), "a")
+    assert heir.checkpoint() == driver.checkpoint()

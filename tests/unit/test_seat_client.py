@@ -123,6 +123,35 @@ def test_who_has_taken_over_once_claims_from_then_on_and_leaves_for_a_successor(
     assert client.place is Place.SUPERSEDED
 
 
+def test_readings_that_were_overtaken_say_nothing():
+    client = SeatClient("me")
+    client.see(readings(4, driver="a"), 0.0)
+    client.see(readings(5, driver="a"), 0.0)
+    client.see(readings(5, driver="me"), 0.0)
+    for late in (readings(4, driver="a"), readings(4, driver=""), readings(5, driver="a", author="a")):
+        assert client.stale(late)
+        assert client.see(late, 1.0) == []
+        assert client.place is Place.DRIVING
+    client.see(readings(5, driver="b"), 2.0)
+    assert client.place is Place.QUEUED, "another one was seated in the same tick"
+    client.see(readings(5, driver="me"), 3.0)
+    assert client.place is Place.DRIVING, "who is named itself believes it"
+    client.see(readings(5, driver=""), 4.0)
+    assert client.place is Place.SEEKING
+    client.see(readings(6, driver="a"), 4.0)
+    assert client.place is Place.QUEUED, "in a later tick anybody may drive"
+    client.see(readings(2, driver="me", run="s"), 5.0)
+    assert client.place is Place.DRIVING, "another run has ticks of its own"
+
+
+def test_a_simulation_that_is_back_may_seat_anybody_in_the_same_tick():
+    client = SeatClient("me")
+    client.see(readings(5, driver="a"), 0.0)
+    client.see(readings(5, driver="b"), 0.0)
+    client.simulation_is_back()
+    assert not client.stale(readings(5, driver="a"))
+
+
 def test_a_standby_that_lost_the_seat_stands_by_again():
     client = SeatClient("me", "stand by")
     client.see(readings(driver="me"), 0.0)

@@ -239,6 +239,7 @@ class Agent:
         self.visits = list(meta.visits)
         self.epoch, self.budget = meta.epoch, max(meta.budget, self.budget)
         self._run, self._tick, self._episode, self._steps = meta.run, meta.tick, meta.episode, meta.steps
+        self._memory.clear()
         self._memory.lights.extend(meta.lights)
         self._state, self._linked = meta.state or None, meta.linked
         self.command = None

@@ -44,8 +44,6 @@ class AgentClient:
         by `on`, for a world that cannot be joined in this way, a checkpoint that does not fit, or a learner that fails.
     """
 
-    deadline = math.inf
-
     def __init__(
         self,
         ident: str,
@@ -71,9 +69,16 @@ class AgentClient:
             return self._bequeath(event)
         if event.topic == "unwritten":
             return self._keeping.unwritten(event.message, self.agent, now)
+        if event.topic == "time" and self._session is not None:
+            return self._session.following.again(now)
         if event.topic == "alive" and event.message[0] == "sim":
             self.seat.simulation_is_back()
         return self._leave() if event.topic == "stop" else []
+
+    @property
+    def deadline(self) -> float:
+        """When a question that may be lost is put once more."""
+        return math.inf if self._session is None else self._session.following.again_at
 
     @property
     def agent(self) -> Answerer | None:
@@ -110,13 +115,18 @@ class AgentClient:
         return [effect for readings in waiting for effect in self._readings(readings, now)]
 
     def _tick(self, session: Session, readings: Readings | ReadingsOfMany, now: float) -> list[Effect]:
-        before = self.seat.place
+        if self.seat.stale(readings):
+            return []
+        before, inherits = self.seat.place, self.seat.mode != "claim"
         effects = self.seat.see(readings, now)
         place = self.seat.place
         if place is Place.SUPERSEDED:
             return [*effects, *self._leave()]
         if place is Place.DRIVING:
-            return self._drive(session, readings, now) if before is place else self._sit(session, readings, now, before)
+            if before is place:
+                return self._drive(session, readings, now)
+            equal = not inherits or (before is Place.IN_STEP and not session.missed(readings))
+            return self._sit(session, readings, now, equal)
         if before is Place.DRIVING:
             effects = [Flush(), *effects]
         if self.seat.mode != "claim" and readings.driver:
@@ -125,15 +135,14 @@ class AgentClient:
                 effects += self._follow(session, readings, now, fresh)
         return effects
 
-    def _sit(self, session: Session, readings: Readings | ReadingsOfMany, now: float, before: Place) -> list[Effect]:
-        """Begin to drive, with what the predecessor knows if it is of the same kind."""
+    def _sit(self, session: Session, readings: Readings | ReadingsOfMany, now: float, equal: bool) -> list[Effect]:
+        """Begin to drive; who is not its predecessor's equal asks that one first for what it knows."""
         said = Say(f"drives from tick {readings.tick} on")
-        following = session.following
-        predecessor, following.predecessor = following.predecessor, ""
-        if not predecessor or (before is Place.IN_STEP and not session.missed(readings)):
+        predecessor = session.following.predecessor_at(readings)
+        if equal or not predecessor:
             return [said, *self._drive(session, readings, now)]
         self._wait(readings)
-        return [said, *following.ask(predecessor, now)]
+        return [said, *session.following.ask(predecessor, now)]
 
     def _follow(self, session: Session, readings: Any, now: float, fresh: bool) -> list[Effect]:
         """Learn from what another driver does; a standby of its kind keeps in step with it."""
@@ -147,7 +156,7 @@ class AgentClient:
         stands_by = seat.mode == "stand by"
         if stands_by and seat.place is not Place.IN_STEP and following.due(now) and not following.probes:
             self._wait(readings)
-            return [*effects, *following.ask(following.leader, now)]
+            return [*effects, *following.ask(following.leader, now, probe=following.related is None)]
         if seat.place in (Place.SHADOWING, Place.IN_STEP):
             effects += self._learn(session, readings, now)[0]
         return effects

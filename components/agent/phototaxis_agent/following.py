@@ -11,7 +11,9 @@ from phototaxis.messages import CheckpointReply, CheckpointRequest, Readings, Re
 from phototaxis_agent.answering import Answerer
 
 INHERIT_WITHIN_S = 4.0
-"""How long a predecessor gets to hand over what it knows; so long we wait before we ask it again."""
+"""How long a predecessor gets to hand over what it knows; so long a standby waits before it begins again."""
+ASK_AGAIN_S = 0.5
+"""A question that is not answered by then may be lost, and is put once more; where nobody is, the answer is at once."""
 TAG = "inherit"
 
 Outcome = Literal["same kind", "another kind", "inherited", "nothing"]
@@ -23,18 +25,19 @@ class Following:
 
     Attributes
     ----------
+    again_at : when the question that is out is put once more; infinity for never.
     leader : the driver that is followed, once a command of it was applied: it has nothing to ask of us any more.
-    predecessor : the driver that was seen last.
-    related : whether the leader has the same learner and percept.
+    related : whether the leader has the same learner and percept, None while it does not answer.
     """
 
     def __init__(self, run: str, agent: Answerer):
         self._run, self._agent = run, agent
-        self.leader = self.predecessor = ""
-        self.related = False
+        self.leader = self._named = ""
+        self.related: bool | None = False
         self._asked: Ask | None = None
         self._probe = False
-        self._retry_at = -math.inf
+        self._retry_at = self._until = -math.inf
+        self.again_at = math.inf
 
     @property
     def probes(self) -> bool:
@@ -48,30 +51,50 @@ class Following:
 
     def see(self, readings: Readings | ReadingsOfMany) -> bool:
         """Note who drives; whether there is a new leader."""
-        self.predecessor = readings.driver
+        self._named = readings.driver
         fresh = readings.driver != self.leader and readings.author == readings.driver
         self.leader = readings.driver if fresh else self.leader
         return fresh
 
     def due(self, now: float) -> bool:
-        """Whether the leader's state is worth asking for."""
-        return self.related and now >= self._retry_at
+        """Whether the leader's state, or its kind while that is not known, is worth asking for."""
+        return self.related is not False and now >= self._retry_at
 
     def ask(self, whom: str, now: float, probe: bool = False) -> list[Effect]:
         """Ask an agent for its checkpoint; with `probe` only whether it would fit."""
         request = CheckpointRequest(agent=whom, learner=self._agent.name, percept=self._agent.task.percept, probe=probe)
         tag = f"{TAG} {self._run} {whom} {now}"
         self._asked, self._probe = Ask(tag, "checkpoint", request, INHERIT_WITHIN_S, agent=whom), probe
+        self._until, self.again_at = now + INHERIT_WITHIN_S, now + ASK_AGAIN_S
         return [self._asked]
+
+    def again(self, now: float) -> list[Effect]:
+        """Put the question that is out once more, where that is due; the first answer to any of them counts."""
+        left = self._until - now
+        if self._asked is None or now < self.again_at:
+            return []
+        self.again_at = now + ASK_AGAIN_S if left > ASK_AGAIN_S else math.inf
+        return [self._asked._replace(timeout=left)] if left > 0 else []
+
+    def predecessor_at(self, readings: Readings | ReadingsOfMany) -> str:
+        """Whom to inherit from when we sit down: the author of the last command, who alone surely knows all before it.
+
+        A driver that was named but has not driven has nothing of its own. "" for nobody: we have driven last.
+        """
+        named, self._named = self._named, ""
+        known = readings.author or named
+        return "" if known == self._agent.author else known
 
     def answered(self, answer: Answer, now: float) -> tuple[Outcome | None, list[Effect]]:
         """What an answer brings; None when it belongs to an earlier question or another run."""
         asked, reply = self._asked, answer.first
         if asked is None or answer.tag != asked.tag:
             return None, []
-        self._asked = None
+        self._asked, self.again_at = None, math.inf
+        if reply is None:
+            self._retry_at = now + INHERIT_WITHIN_S
         if self._probe:
-            self.related = reply is not None and not reply.reason
+            self.related = None if reply is None else not reply.reason
             return "same kind" if self.related else "another kind", []
         fault = self._inherit(reply, asked.agent)
         if fault is None:

@@ -108,6 +108,10 @@ class SeatClient:
         self._asked: Mode | None = None
         """How the question that is out asks for the seat."""
         self._ask_at = -math.inf
+        self._moment = ("", -1)
+        """Run and tick of the newest readings."""
+        self._named: list[str] = []
+        """Who was named the driver in them, the last one last."""
 
     @property
     def place(self) -> Place:
@@ -115,8 +119,11 @@ class SeatClient:
         return self._place.state
 
     def see(self, readings: Readings | ReadingsOfMany, now: float) -> list[Effect]:
-        """Take in whom the readings name as the driver, and ask for the seat where that is due."""
+        """Take in whom the readings name as the driver, unless they are stale; ask for the seat where that is due."""
+        if self.stale(readings):
+            return []
         before, driver = self.place, readings.driver
+        self._note(readings)
         after = self._place.take(self._meaning(readings))
         if after is Place.DRIVING:
             if before is not Place.DRIVING:
@@ -130,6 +137,17 @@ class SeatClient:
         if after is Place.QUEUED and before is not Place.QUEUED and self.mode == "claim":
             said.append(Say(f"waits until {driver} leaves the seat; --take-over takes it, --standby inherits it"))
         return [*said, *self._seek(driver, now)]
+
+    def stale(self, readings: Readings | ReadingsOfMany) -> bool:
+        """Whether the readings were overtaken: by a later tick of the run, or by who drives the same tick after them.
+
+        Whoever is named itself believes it: an answer too many is not applied, but without an answer all would wait.
+        A free seat is believed, too: a simulation that has come back shows one.
+        """
+        run, tick = self._moment
+        if readings.run != run or readings.tick > tick:
+            return False
+        return readings.tick < tick or (readings.driver != self.ident and readings.driver in self._named[:-1])
 
     def want(self, mode: Mode, now: float) -> list[Effect]:
         """Seek the seat in this way from now on, and ask at once."""
@@ -152,8 +170,9 @@ class SeatClient:
         self._has_driven, self.mode = True, "claim"
 
     def simulation_is_back(self) -> None:
-        """A simulation that has just come knows nothing of who waits for its seat."""
+        """A simulation that has just come knows nothing of who waits for its seat, and anybody may sit down."""
         self._known = False
+        self._named.clear()
 
     def enter(self) -> None:
         """Begin anew in another run."""
@@ -168,6 +187,14 @@ class SeatClient:
         """Give the seat back, or the place in the queue for it."""
         self._place.take(Seen.LEFT)
         return [Ask(RELEASE, "control", Control(verb="release", agent=self.ident), RELEASE_WITHIN_S)]
+
+    def _note(self, readings: Readings | ReadingsOfMany) -> None:
+        """Remember whom the readings name, after all whom the same tick has named."""
+        moment, driver = (readings.run, readings.tick), readings.driver
+        if moment != self._moment:
+            self._moment, self._named = moment, []
+        if driver:
+            self._named = [*(name for name in self._named if name != driver), driver]
 
     def _meaning(self, readings: Readings | ReadingsOfMany) -> Seen:
         driver = readings.driver
