@@ -370,3 +370,32 @@ def test_nothing_follows_after_the_end(given: Event):
     assert Stop in kinds(desk.give(STOP))
     assert desk.phase is Phase.ENDED
     assert Stop not in kinds(desk.give(given))
+
+
+def test_a_command_of_a_former_driver_is_not_applied():
+    paused = seated()
+    paused.ask("stand by", "b")
+    paused.ask("pause")
+    paused.command("a")
+    paused.give(Event("gone", ("agent", "a")))
+    assert paused.status().waiting_for == "the command of b"
+    paused.ask("resume")
+    assert paused.tick == 0
+    clocked = seated(speed=1.0)
+    clocked.command("a", left=0.25)
+    clocked.give(Event("gone", ("agent", "a")))
+    clocked.ask("claim", "b")
+    clocked.wait(PERIOD * 1.01)
+    state = clocked.machine.steps.simulation.state
+    assert (state.tick, state.author, clocked.status().late) == (1, "", 1)
+
+
+def test_patience_ends_at_its_deadline_whatever_the_clock_shows():
+    for began in range(1, 1000):
+        desk = Desk(patience=0.1)
+        desk.now = began / 7
+        desk.ask("claim", "a")
+        desk.ask("stand by", "b")
+        desk.now = desk.machine.steps.heard_at + 0.1
+        desk.give(TIME)
+        assert desk.machine.steps.seat.driver == "b", began

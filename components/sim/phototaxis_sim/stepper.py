@@ -131,7 +131,7 @@ class Stepper:
                 steps.seat.heir = ""
                 if steps.seat.vacate(steps.tick):
                     steps.ask()
-        if self._contested and now - steps.heard_at >= self._patience:
+        if self._contested and now >= steps.heard_at + self._patience:
             who = f"{steps.seat.driver} has been silent for {self._patience:g} s"
             steps.out.append(Say(f"{who} and loses the seat at tick {steps.tick}"))
             steps.seat.vacate(steps.tick)

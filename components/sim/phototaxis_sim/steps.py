@@ -142,6 +142,7 @@ class Steps:
             self.pace.set(self.pace.speed, self.now)
         if self._driver != driver:
             self._driver, self.heard_at = driver, self.now
+            self.held = None  # its author drives no more
         self.question.asked(self.now)
         self.publish()
 
