@@ -4,7 +4,7 @@ from simulated.schedule import make
 from simulated.storm import results, run, shrink
 from simulated.timeline import Timeline
 
-SEEDS = range(40)
+SEEDS = range(2000)
 """About 300,000 ticks: half a minute on two cores that are idle."""
 
 
