@@ -4,14 +4,19 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from phototaxis.journal import Journal
+from phototaxis.machine import Append
 from phototaxis.protocol import Once
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.following import Following
 from phototaxis_agent.keeping import Keeping
 from phototaxis_sensors.suite import SensorSuite
+from phototaxis_sim.simulation import Simulation
+from phototaxis_sim.stepper import Stepper
+from phototaxis_sim.steps import Steps
 
 LENGTH = struct.Struct("<II")
 
@@ -39,8 +44,6 @@ def _again(right):
 
 
 def _restored_without(**lost):
-    import msgspec
-
     def make(right):
         def restore(self, meta, arrays, source):
             right(self, msgspec.structs.replace(meta, **lost), arrays, source)
@@ -80,6 +83,38 @@ def _drifting(right):
     return sense
 
 
+def _taken_for(**fields):
+    """Commands are taken as if these fields were right; each is made from the machine."""
+
+    def make(right):
+        def command(self, given):
+            right(self, msgspec.structs.replace(given, **{name: of(self) for name, of in fields.items()}))
+
+        return command
+
+    return make
+
+
+def _unwritten(right):
+    def apply(self, entry):
+        right(self, entry)
+        self.out = [effect for effect in self.out if not isinstance(effect, Append)]
+
+    return apply
+
+
+def _nothing(right):
+    return lambda self, *given: None
+
+
+def _entries_lost(right):
+    return lambda self, found: right(self, found._replace(entries=[]))
+
+
+def _chain_lost(right):
+    return lambda self, at, *given: right(self, msgspec.structs.replace(at, chain=b"\0" * 8), *given)
+
+
 MUTATIONS = [
     Mutation("publishes before the journal", AgentClient, "_drive", _later),
     Mutation("keeps no journal of the readings", Keeping, "entry", lambda _: lambda self, readings: []),
@@ -91,5 +126,11 @@ MUTATIONS = [
     Mutation("loses the random state with a checkpoint", Agent, "restore", _other_random),
     Mutation("takes a torn frame for a whole one", Journal, "read", _torn_is_whole),
     Mutation("inherits nothing", Following, "_inherit", lambda _: lambda self, reply, source: "nothing"),
+    Mutation("applies the command of another tick", Steps, "command", _taken_for(tick=lambda self: self.tick)),
+    Mutation("asks before the journal has what led there", Stepper, "on", _later),
+    Mutation("keeps no journal of the commands", Steps, "apply", _unwritten),
+    Mutation("begins no new journal with an episode", Steps, "_begin_journal", _nothing),
+    Mutation("does not make the journal's commands again", Steps, "go_on", _entries_lost),
+    Mutation("begins the chain of hashes anew", Simulation, "restore", _chain_lost),
     Mutation("sensors that are asked again sense otherwise", SensorSuite, "__call__", _drifting),
 ]

@@ -1,14 +1,14 @@
 """A schedule: a world, a network and a list of faults. A seed makes one; taking faults away leaves a schedule."""
 
 from random import Random
-from typing import Literal
+from typing import Literal, get_args
 
 from msgspec import Struct
 
 from simulated.network import Weather
 
-Kind = Literal["kill agent", "kill sensors", "freeze agent", "freeze sensors", "swap"]
-KINDS: tuple[Kind, ...] = ("kill agent", "kill sensors", "freeze agent", "freeze sensors", "swap")
+Kind = Literal["kill sim", "kill agent", "kill sensors", "freeze sim", "freeze agent", "freeze sensors", "swap"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 class Fault(Struct, frozen=True):

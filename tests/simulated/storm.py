@@ -68,6 +68,7 @@ class Storm:
         self._system = System(folder, schedule.seed, arena, fresh, schedule.world, schedule.epochs)
         self._system.network.weather = msgspec.structs.replace(schedule.weather)
         self._names = ["agent"]
+        self._sim = self._system.simulation()
         self._sensors, self._agent = self._system.sensors(), self._system.agent("agent")
 
     def run(self) -> int:
@@ -82,14 +83,11 @@ class Storm:
         system.witness.on_tick = self._begin_at
         system.timeline.after(BACK_AFTER_S, self._watch)
         if not system.finish(LIMIT_S):
-            raise Broken(f"the run stands at tick {system.asker.simulation.state.tick} after {LIMIT_S:g} s")
+            raise Broken(f"the run stands at tick {system.tick} after {LIMIT_S:g} s")
         state_hash, learner_hash, ticks = reference(schedule.world, schedule.epochs)
-        if system.asker.hashes[-1] != state_hash:
+        if system.hash != state_hash:
             raise Broken("the state's hash is another than in one process")
-        if any(author != driver for author, driver in system.asker.applied):
-            raise Broken("a command was applied that was not the driver's")
-        driver = system.asker.seat.driver or system.asker.applied[-1][0]
-        if load(system.checkpoint(driver))[0].learner_hash != learner_hash:
+        if load(system.checkpoint(system.driver or system.witness.author))[0].learner_hash != learner_hash:
             raise Broken("what was learned is another than in one process")
         self.counts.update({name: count for name, count in system.network.counts.items() if name != "sent"})
         return ticks
@@ -97,12 +95,14 @@ class Storm:
     def _watch(self) -> None:
         """Start again what has died."""
         system = self._system
+        if self._sim.dead:
+            self._sim = system.simulation()
         if self._sensors.dead:
             self._sensors = system.sensors()
-        if self._agent.dead and not system.asker.finished:
+        if self._agent.dead and not system.finished:
             mode = "claim" if len(self._names) == 1 else "take over"
             self._agent = system.agent(self._names[-1], mode, restarted=True)
-        if not system.asker.finished:
+        if not system.finished:
             system.timeline.after(BACK_AFTER_S, self._watch)
 
     def _begin_at(self, tick: int) -> None:
@@ -114,10 +114,10 @@ class Storm:
         self.counts[fault.kind] += 1
         if fault.kind == "swap":
             agent = self._agent  # one that dies before it hands over takes what it knows with it
-            if not agent.dead and agent.kill_in is None and self._system.asker.seat.driver == agent.ident:
+            if not agent.dead and agent.kill_in is None and self._system.driver == agent.ident:
                 self._swap()
             return
-        process = self._agent if fault.kind.endswith("agent") else self._sensors
+        process = {"sim": self._sim, "sensors": self._sensors, "agent": self._agent}[fault.kind.split()[1]]
         if fault.kind.startswith("kill"):
             process.kill_in, process.tear = fault.effects, fault.tear
         elif not process.dead:

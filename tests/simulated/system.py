@@ -1,4 +1,4 @@
-"""A whole system on the simulated network: real sensors and agents, and what starts them again when they die."""
+"""A whole system on the simulated network: the real simulation, sensors and agents, each from what is on its disk."""
 
 from collections.abc import Callable
 from functools import partial
@@ -18,9 +18,13 @@ from phototaxis_agent.rows import AgentLogs
 from phototaxis_sensors.choice import make_suite
 from phototaxis_sensors.sensing import Sensing
 from phototaxis_sensors.server import chunk
+from phototaxis_sim.continued import open_journal
+from phototaxis_sim.log import chunks
+from phototaxis_sim.pace import Pace
+from phototaxis_sim.phases import Phase
 from phototaxis_sim.simulation import Simulation
+from phototaxis_sim.stepper import Stepper
 
-from simulated.asker import Asker
 from simulated.network import Network, Weather
 from simulated.process import Process
 from simulated.sensing import RememberedChoice
@@ -36,7 +40,7 @@ class System:
 
     Parameters
     ----------
-    folder : where agents keep their checkpoints and journals.
+    folder : where the simulation and the agents keep their checkpoints and journals.
     seed : of all faults; the world has a seed of its own.
     make : makes an agent that has learned nothing.
     """
@@ -47,12 +51,41 @@ class System:
         self.timeline, self.rng, self.witness = Timeline(), Random(seed), Witness()
         self.network = Network(self.timeline, self.rng, Weather())
         self._folder, self._make, self._starts = folder, make, 0
-        self.asker = Asker(Simulation(arena, world_seed, "run", epochs))
-        self._process("sim").start(self.asker)
+        self._fresh = lambda: Simulation(arena, world_seed, "run", epochs)
+        self._pace = lambda: Pace(arena.motion.control_period)
 
     def _process(self, role: str, ident: str = "") -> Process:
         self._starts += 1
         return Process(self.network, role, ident or f"{role}-{self._starts}", self.witness.carried)
+
+    def simulation(self) -> Process:
+        """Start the simulation, or start it again from its journal."""
+        process, journal = self._process("sim"), Journal(self._folder / "sim.journal")
+        fresh = self._fresh()
+        self._stepper = Stepper(fresh, self._pace(), lambda: "0000", open_journal(journal, fresh))
+        log = Chunks(process, "log/sim", chunks(process.ident))
+        process.start(self._stepper, journal, Store(journal), log)
+        return process
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last tick has its answer."""
+        return self._stepper.steps.state is Phase.FINISHED
+
+    @property
+    def driver(self) -> str:
+        """Who holds the seat."""
+        return self._stepper.steps.seat.driver
+
+    @property
+    def hash(self) -> str:
+        """The state's hash at the present tick."""
+        return self._stepper.steps.simulation.state.hash
+
+    @property
+    def tick(self) -> int:
+        """The present tick."""
+        return self._stepper.steps.tick
 
     def sensors(self) -> Process:
         """Start the sensors."""
@@ -83,7 +116,7 @@ class System:
 
     def finish(self, limit: float) -> bool:
         """Whether the run ends within `limit` seconds of virtual time, and what is still to come has come."""
-        done = self.timeline.run(lambda: self.asker.finished, limit)
+        done = self.timeline.run(lambda: self.finished, limit)
         self.network.weather = Weather()
         self.timeline.run(lambda: False, 1.0)
         return done

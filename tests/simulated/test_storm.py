@@ -1,11 +1,11 @@
-"""Agents and sensors on the simulated network: whatever a schedule does, the run is the one in one process."""
+"""The whole system on the simulated network: whatever a schedule does, the run is the one in one process."""
 
 from simulated.schedule import make
 from simulated.storm import results, run, shrink
 from simulated.timeline import Timeline
 
-SEEDS = range(40)
-"""About 300,000 ticks: half a minute on two cores that are idle."""
+SEEDS = range(1000)
+"""About 150,000 ticks."""
 
 
 def test_every_schedule_ends_with_the_hashes_of_the_run_in_one_process():

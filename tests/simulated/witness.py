@@ -22,17 +22,21 @@ class Witness:
     - The answer of a process to a tick never changes.
     - An agent that keeps a journal has written a tick down before it answers it.
     - An agent learns from each tick once, and in order.
+    - A tick has one state, and the command that led to it is of the driver that was named last when it was asked for.
     - What an agent finds in its journal are whole entries.
 
     Attributes
     ----------
     on_tick : is told each tick that the simulation asks for.
+    author : whose command was applied last.
     """
 
     def __init__(self) -> None:
         self.on_tick: Callable[[int], object] = lambda tick: None
         self.answers: dict[tuple[str, str, int, str], Any] = {}
         self._kept: dict[str, int] = {}
+        self._states: dict[tuple[str, int], State] = {}
+        self.author = ""
 
     def carried(self, process: Process, effect: m.Effect) -> None:
         """An effect has been carried out."""
@@ -41,9 +45,19 @@ class Witness:
         elif process.role == "agent" and isinstance(effect, m.Save):
             self._kept[process.ident] = max(effect.meta.tick, self._kept.get(process.ident, -1))
         elif isinstance(effect, m.Publish) and isinstance(effect.message, State):
+            self._asked(msgspec.structs.replace(effect.message))
             self.on_tick(effect.message.tick)
         elif isinstance(effect, m.Publish) and effect.topic in ("readings", "command"):
             self._answered(process, effect.topic, effect.message)
+
+    def _asked(self, state: State) -> None:
+        before, known = self._states.get((state.run, state.tick - 1)), self._states.get((state.run, state.tick))
+        if known is not None and known.hash != state.hash:
+            raise Broken(f"tick {state.tick} comes in two states")
+        if known is None and state.author and before is not None and state.author != before.driver:
+            raise Broken(f"tick {state.tick} follows a command of {state.author}, but {before.driver} drove")
+        self._states[state.run, state.tick] = state
+        self.author = state.author or self.author
 
     def _answered(self, process: Process, topic: str, message: Any) -> None:
         told = msgspec.structs.replace(message, driver="") if topic == "readings" else message
