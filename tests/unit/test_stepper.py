@@ -234,6 +234,21 @@ def test_in_real_time_the_newest_command_holds_until_it_is_stale():
     assert desk.out[0] == Listen("readings", False)
 
 
+def test_a_held_command_is_applied_when_lockstep_begins():
+    desk = seated(speed=1.0)
+    desk.command(left=0.25)
+    desk.ask("speed", speed=0)
+    assert (desk.tick, desk.machine.steps.simulation.state.left) == (1, 0.25)
+
+
+def test_a_continued_simulation_keeps_the_seat_for_who_took_over_as_the_episode_ended():
+    desk = seated()
+    desk.ask("take over", "b", at=1)
+    (begun,) = (one for one in desk.command(end="cap") if isinstance(one, Begin))
+    found = continued([begun.header], Simulation(PAPER, 3, "r"), Path("journal"))
+    assert Desk(found=found).machine.steps.seat.heir == "b"
+
+
 def test_a_part_that_is_too_slow_is_named_once():
     desk = seated(speed=100.0)
     said = [one.text for one in desk.wait(2) if isinstance(one, Say)]

@@ -136,7 +136,7 @@ class AgentClient:
         return effects
 
     def _sit(self, session: Session, readings: Readings | ReadingsOfMany, now: float, equal: bool) -> list[Effect]:
-        """Begin to drive; who is not its predecessor's equal asks that one first for what it knows."""
+        """Begin to drive. An agent that does not equal its predecessor first asks it for what it knows."""
         said = Say(f"drives from tick {readings.tick} on")
         predecessor = session.following.predecessor_at(readings)
         if equal or not predecessor:
@@ -168,7 +168,7 @@ class AgentClient:
         effects, command = self._learn(session, readings, now)
         if command is None:
             return effects
-        if 0 < session.world.epochs <= readings.epoch:  # who sees the run finished finds the checkpoint
+        if 0 < session.world.epochs <= readings.epoch:  # on disk before the run is seen to be finished
             effects += self._keeping.save(agent, now, complete=True)
         effects.append(Publish(session.topics.command, command))
         return [*effects, row(agent)] if fresh else effects

@@ -50,7 +50,7 @@ class Following:
         return self._asked is not None and not self._probe
 
     def see(self, readings: Readings | ReadingsOfMany) -> bool:
-        """Note who drives; whether there is a new leader."""
+        """Note the driver that the readings name; return whether it is a new leader."""
         self._named = readings.driver
         fresh = readings.driver != self.leader and readings.author == readings.driver
         self.leader = readings.driver if fresh else self.leader

@@ -28,7 +28,7 @@ class Kept(NamedTuple):
 
 
 class Keeping:
-    """Says what is to be written when; without a place for it (`wanted` is False), nothing.
+    """Decides what the agent writes to disk, and when. It writes nothing where `wanted` is False.
 
     The journal's entry of a tick comes before the command is published. An entry that the disk does not take is
     not written again: the checkpoint that follows holds what was learned from it, and begins the journal anew.

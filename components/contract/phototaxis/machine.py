@@ -92,7 +92,7 @@ class Ask(NamedTuple):
     timeout: float = 2.0
     """Seconds after which the event comes without an answer."""
     every: bool = False
-    """Wait for the answers of all who have one; otherwise the first valid answer is the only one."""
+    """True: gather the answers of every component that answers. False: take the first valid answer."""
     agent: str = ""
     """Ask the agent with this name: agents of one machine are not linked to each other."""
 
@@ -146,7 +146,7 @@ class Save(NamedTuple):
 
 
 class Record(NamedTuple):
-    """Add a row to what is to be recorded. A chunk of rows has one head: another head closes the chunk."""
+    """Add a row to the log. All rows of a chunk share one head; a row with another head begins a new chunk."""
 
     head: tuple[Any, ...]
     row: tuple[Any, ...]

@@ -1,4 +1,4 @@
-"""The one table of roles: who is on the bus, what each reads and asks, and how its process is started and ended.
+"""The table of roles: for each kind of component its topics, its queries, and how its process starts and ends.
 
 Subscriptions, links, rights, subcommands, the launcher's processes, health checks and the services of
 `deploy/compose.yaml` derive from it.

@@ -1,4 +1,4 @@
-"""The client's side of the one seat: when to ask for it, and what each message says about who drives."""
+"""The client's side of the driver's seat: when to ask for it, and what each message says about the driver."""
 
 import math
 from enum import StrEnum
@@ -139,10 +139,10 @@ class SeatClient:
         return [*said, *self._seek(driver, now)]
 
     def stale(self, readings: Readings | ReadingsOfMany) -> bool:
-        """Whether the readings were overtaken: by a later tick of the run, or by who drives the same tick after them.
+        """Whether the readings are out of date: a later tick of the run, or a later driver of the same tick, was seen.
 
-        Whoever is named itself believes it: an answer too many is not applied, but without an answer all would wait.
-        A free seat is believed, too: a simulation that has come back shows one.
+        Readings that name this client are never stale: a surplus answer is not applied, a missing one stops the run.
+        Readings with a free seat are never stale either: a restarted simulation shows one.
         """
         run, tick = self._moment
         if readings.run != run or readings.tick > tick:

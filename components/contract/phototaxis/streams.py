@@ -10,9 +10,9 @@ class _Dropping(io.FileIO):
 
     def write(self, data: object) -> int:
         try:
-            return super().write(data)  # type: ignore[arg-type]
+            return super().write(data)  # type: ignore[arg-type] - any buffer, as FileIO takes it
         except OSError:
-            return len(memoryview(data))  # type: ignore[arg-type]
+            return len(memoryview(data))  # type: ignore[arg-type] - the same
 
 
 def prepare() -> None:

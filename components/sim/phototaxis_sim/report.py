@@ -13,7 +13,7 @@ from phototaxis_sim.simulated import Simulated
 
 STATUS_EVERY_S = 0.2
 WAITS_AFTER_S = 0.5
-"""So long without an answer, and the status says "waiting" and for whom."""
+"""After so long without an answer the status says "waiting", and names the part that is late."""
 MAX_RECENT = 50
 """Ended episodes whose outcomes count as recent."""
 _NEEDED = ("sensors", "agent")

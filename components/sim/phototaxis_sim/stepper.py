@@ -65,7 +65,7 @@ class Stepper:
             "pause": lambda _: self._stand(Given.PAUSE),
             "resume": self._resume,
             "step": self._step,
-            "speed": lambda asked: self._pace_set(asked.speed),
+            "speed": self._speed,
             "reset": self._reset,
             "begin": self._begin,
             "stop": self._stop,
@@ -194,6 +194,11 @@ class Stepper:
         steps.steps_due, steps.heard_at = 0, steps.now
         steps.pace.set(steps.pace.speed, steps.now)
         steps.use()
+
+    def _speed(self, asked: Control) -> None:
+        self._pace_set(asked.speed)
+        if not self.steps.pace.realtime:  # lockstep does not wait for the clock
+            self.steps.use()
 
     def _step(self, _: Control) -> None:
         if self.steps.state is not Phase.PAUSED:

@@ -122,11 +122,11 @@ class Steps:
         """Go on by one tick."""
         before = self.simulation.watched
         self._advance(entry)
+        self.seat.boundary(self.tick)
         if entry.end:
             self._begin_journal()
         elif self._keeps:
             self.out.append(Append(msgspec.msgpack.encode(entry)))
-        self.seat.boundary(self.tick)
         self.ask()
         self.record(before)
         if self.simulation.ended is not None:

@@ -59,7 +59,7 @@ class Episode(Message, kw_only=True):
 
 
 class Seating(Struct, forbid_unknown_fields=True, kw_only=True):
-    """One change of the seat: who drives from which tick on, and why."""
+    """One change of the seat: the new driver, its first tick, and how it got the seat."""
 
     driver: Name
     """Name of the agent that sat down."""
