@@ -155,9 +155,23 @@ def test_a_simulation_that_is_back_may_seat_anybody_in_the_same_tick():
 def test_a_standby_that_lost_the_seat_stands_by_again():
     client = SeatClient("me", "stand by")
     client.see(readings(driver="me"), 0.0)
-    assert asked(client.see(readings(1, driver="b", author="b"), 1.0)) == ["stand by"]
+    assert asked(client.see(readings(1, driver="b", author="me"), 1.0)) == ["stand by"]
     client.see(readings(2, driver="b", author="b"), 2.0)
     assert client.place is Place.QUEUED
+
+
+@pytest.mark.parametrize("seen", [Seen.EQUAL, Seen.APART])
+def test_a_standby_queues_once_it_knows_what_the_driver_knows_or_that_it_cannot(seen):
+    client = SeatClient("me", "stand by")
+    for now in (0.0, 1.0):
+        assert client.see(readings(driver="a", author="a"), now) == [], "a seat it is given now is a state that is lost"
+    client.learn(seen)
+    assert asked(client.see(readings(1, driver="a", author="a"), 2.0)) == ["stand by"]
+
+
+def test_a_standby_sits_down_where_there_is_nothing_to_inherit():
+    for driver, author in (("", ""), ("a", ""), ("a", "b"), ("", "a")):
+        assert asked(SeatClient("me", "stand by").see(readings(1, driver=driver, author=author), 0.0)) == ["stand by"]
 
 
 def test_in_another_run_it_is_no_successors_predecessor():

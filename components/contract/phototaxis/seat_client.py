@@ -136,7 +136,7 @@ class SeatClient:
             said.append(Say(f"unseated at tick {readings.tick}: {driver or 'nobody'} drives"))
         if after is Place.QUEUED and before is not Place.QUEUED and self.mode == "claim":
             said.append(Say(f"waits until {driver} leaves the seat; --take-over takes it, --standby inherits it"))
-        return [*said, *self._seek(driver, now)]
+        return [*said, *self._seek(readings, now)]
 
     def stale(self, readings: Readings | ReadingsOfMany) -> bool:
         """Whether the readings are out of date: a later tick of the run, or a later driver of the same tick, was seen.
@@ -207,10 +207,18 @@ class SeatClient:
             return Seen.SUCCEEDED
         return Seen.TAKEN
 
-    def _seek(self, driver: str, now: float) -> list[Effect]:
+    def _seek(self, readings: Readings | ReadingsOfMany, now: float) -> list[Effect]:
         """Ask where the mode wants it: a claim while nobody drives, everything else until the simulation knows."""
-        wanted = not driver if self.mode == "claim" else not self._known
+        if self.mode == "claim":
+            wanted = not readings.driver
+        else:
+            wanted = not self._known and (self.mode == "take over" or self._ready(readings))
         return self._ask(now) if wanted and now >= self._ask_at else []
+
+    def _ready(self, readings: Readings | ReadingsOfMany) -> bool:
+        """Whether a standby may get the seat: the driver has not driven yet, or is matched, or cannot be matched."""
+        has_driven = readings.driver != "" and readings.author == readings.driver
+        return not has_driven or self.place in (Place.SHADOWING, Place.IN_STEP)
 
     def _ask(self, now: float) -> list[Effect]:
         if self._asked is not None:
