@@ -1,7 +1,7 @@
 """The action-perception loop around a learner (section 5.1 and figure 7 of the paper)."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from operator import mul
 from typing import Any, NamedTuple
@@ -164,7 +164,7 @@ class Agent:
         return row
 
     @contextmanager
-    def _aside(self) -> Iterator[None]:
+    def _aside(self) -> Generator[None]:
         """Ask the learner something without an influence on the run: what it draws meanwhile is drawn again."""
         drawn = self._rng.bit_generator.state
         yield

@@ -3,7 +3,7 @@
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -16,7 +16,7 @@ WITHIN = 10.0
 
 
 @contextmanager
-def watched(within: float = WITHIN) -> Iterator[None]:
+def watched(within: float = WITHIN) -> Generator[None]:
     """Warn on stderr, once, which method of a learner this thread has been in for `within` seconds."""
     over = threading.Event()
     thread = threading.Thread(target=_watch, args=(threading.get_ident(), over, within), daemon=True)

@@ -49,9 +49,9 @@ class Bus:
         self.refused: Counter[str] = Counter()
         self._inbox: SimpleQueue[tuple[str, Any]] = SimpleQueue()
         self._decoders: dict[str, Decoder[Any]] = {}
-        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._publishers: dict[str, Any] = {}  # as all that is declared: Zenoh's stubs leave out what methods return
         self._declared: list[Any] = []
-        self._at_times: dict[str, zenoh.Subscriber] = {}
+        self._at_times: dict[str, Any] = {}
         reads = ROLES[role].reads
         for topic in TOPICS.values():
             if topic.name in reads:
@@ -182,10 +182,8 @@ class Bus:
 
     def close(self) -> None:
         """Take back what was declared, the token last."""
-        for declared in [*self._at_times.values(), *self._declared]:
+        for declared in [*self._at_times.values(), *self._publishers.values(), *self._declared]:
             declared.undeclare()
-        for publisher in self._publishers.values():
-            publisher.undeclare()
 
     def __enter__(self) -> "Bus":
         return self
@@ -198,9 +196,10 @@ class Bus:
         asked = TOPICS[topic]
         return Decoder(asked.reply, asked.reply_limit) if asked.reply else Decoder(asked.message, asked.limit)
 
-    def _subscribe(self, topic: Topic) -> zenoh.Subscriber:
+    def _subscribe(self, topic: Topic) -> Any:
         self._decoders[topic.name] = Decoder(topic.message, topic.limit)
-        return self._session.declare_subscriber(topic.key(self.name), self._callback(topic.name))
+        session: Any = self._session
+        return session.declare_subscriber(topic.key(self.name), self._callback(topic.name))
 
     def _offer(self, topic: Topic) -> None:
         key = topic.key(self.name)
@@ -217,9 +216,13 @@ class Bus:
 
     def _callback(self, source: str) -> Any:
         put = self._inbox.put
-        return Callback(lambda item: put((source, item)), indirect=False)
 
-    def _request(self, source: str, query: zenoh.Query) -> Event:
+        def keep(item: object) -> None:
+            put((source, item))
+
+        return Callback(keep, indirect=False)
+
+    def _request(self, source: str, query: Any) -> Event:
         topic = TOPICS[source]
         kind = topic.message if topic.kind == "query" else REQUESTS.get(topic.kind)
         payload = b"" if query.payload is None else query.payload.to_bytes()

@@ -41,9 +41,14 @@ def get(config: zenoh.Config, key: str) -> Any:
         return None
 
 
+def put(config: Any, key: str, value: Any) -> None:
+    """Set a value of a configuration, whose stubs do not say that this returns nothing."""
+    config.insert_json5(key, msgspec.json.encode(value).decode())
+
+
 def endpoints(config: zenoh.Config, what: str) -> list[Any]:
     """The endpoints to "listen" on (texts) or to "connect" to, in the mode that the configuration has."""
-    found = get(config, f"{what}/endpoints") or []
+    found: list[Any] | dict[str, list[Any] | None] = get(config, f"{what}/endpoints") or []
     return found.get(get(config, "mode") or "peer") or [] if isinstance(found, dict) else found
 
 
@@ -54,10 +59,10 @@ def shut(config: zenoh.Config) -> None:
     """
     for key in DISCOVERY:
         if get(config, key) is None:
-            config.insert_json5(key, "false")
+            put(config, key, False)
     if get(config, "listen/endpoints") == get(zenoh.Config(), "listen/endpoints"):
-        config.insert_json5("listen/endpoints", "[]")
-    config.insert_json5("transport/shared_memory/enabled", "false")
+        put(config, "listen/endpoints", [])
+    put(config, "transport/shared_memory/enabled", False)
 
 
 def open_doors(config: zenoh.Config) -> Iterator[Door]:
@@ -134,6 +139,7 @@ def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
 
 def _rights(config: zenoh.Config) -> bool:
     """Whether a stranger may do nothing: all is denied but what is allowed to names and certificates."""
-    may = get(config, "access_control") or {}
-    named = all(one.get("usernames") or one.get("cert_common_names") for one in may.get("subjects") or [])
+    may: dict[str, Any] = get(config, "access_control") or {}
+    subjects: list[dict[str, Any]] = may.get("subjects") or []
+    named = all(one.get("usernames") or one.get("cert_common_names") for one in subjects)
     return bool(may.get("enabled")) and may.get("default_permission") == "deny" and named

@@ -51,7 +51,7 @@ class Journal:
             return []
         except OSError as error:
             raise UserError(f"{self.path}: {error.strerror}") from None
-        frames, at = [], 0
+        frames, at = list[bytes](), 0
         while at + _FRAME.size <= len(data):
             length, crc = _FRAME.unpack_from(data, at)
             frame = data[at + _FRAME.size : at + _FRAME.size + length]

@@ -12,7 +12,7 @@ import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import msgspec
 
@@ -218,7 +218,7 @@ def flags(struct: Any) -> list[str]:
         if isinstance(value, bool):
             words.append(flag if value else f"--no-{flag[2:]}")
         elif isinstance(value, list):
-            words += [f"{flag}={one}" for one in value]
+            words += [f"{flag}={one}" for one in cast("list[object]", value)]
         else:
             words.append(f"{flag}={value}")
     return words

@@ -69,7 +69,7 @@ def access_control(worlds: Sequence[str]) -> dict[str, Any]:
 
 def low_pass_filter(worlds: Sequence[str]) -> list[dict[str, Any]]:
     """The `low_pass_filter` section: larger messages than a topic's limit do not pass."""
-    found = []
+    found: list[dict[str, Any]] = []
     for world in worlds:
         for topic in TOPICS.values():
             sizes = {"put": topic.limit, "query": topic.limit, "reply": topic.reply_limit or topic.limit}
@@ -88,7 +88,7 @@ def low_pass_filter(worlds: Sequence[str]) -> list[dict[str, Any]]:
 
 def table() -> str:
     """Who may do what, as a Markdown table."""
-    rows = []
+    rows: list[str] = []
     for role in ROLES:
         cells = [", ".join(names) or "–" for names in rights(role)]
         rows.append(f"| {role} | {' | '.join(cells)} |")

@@ -5,7 +5,7 @@ import os
 import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Annotated
@@ -65,7 +65,7 @@ def _own_socket(folder: Path, role: str, ident: str) -> Path:
 
 
 @contextmanager
-def reaching(own: zenoh.Session, options: BusOptions, ident: str) -> Iterator[zenoh.Session | None]:
+def reaching(own: zenoh.Session, options: BusOptions, ident: str) -> Generator[zenoh.Session | None]:
     """A session in which the agent `ident` can be asked; None when it is not there.
 
     Through a router that is our `own`. Agents of this machine are not linked to each other, so there it is
@@ -206,7 +206,7 @@ def _open(config: zenoh.Config, wait: float) -> zenoh.Session:
     if not wait:
         return zenoh.open(config)
     deadline, told = time.monotonic() + wait, False
-    config.insert_json5("connect/timeout_ms", str(round(1000 * min(wait, ATTEMPT))))
+    doors.put(config, "connect/timeout_ms", round(1000 * min(wait, ATTEMPT)))
     while True:
         try:
             return zenoh.open(config)

@@ -5,7 +5,7 @@ import hashlib
 import os
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -98,7 +98,7 @@ def in_use(socket: Path) -> bool:
 
 
 @contextmanager
-def one_after_another(folder: Path) -> Iterator[None]:
+def one_after_another(folder: Path) -> Generator[None]:
     """Agents that start at the same moment sweep and open one after another: a socket that has just been made,
     but is not yet locked, would look like one that a killed agent left."""
     descriptor = os.open(folder, os.O_RDONLY)

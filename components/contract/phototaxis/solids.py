@@ -49,8 +49,10 @@ def distance(solid: Solid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     if isinstance(solid, Disc):
         return np.hypot(x - solid.centre[0], y - solid.centre[1]) - solid.radius
     turns = [(bx - ax) * (y - ay) - (by - ay) * (x - ax) for (ax, ay), (bx, by) in _sides(solid)]
-    inside = np.logical_and.reduce([turn > 0 for turn in turns]) | np.logical_and.reduce([turn < 0 for turn in turns])
-    away = np.minimum.reduce([_from_line(x, y, *side) for side in _sides(solid)])
+    inside: np.ndarray = np.logical_and.reduce([turn > 0 for turn in turns]) | np.logical_and.reduce(
+        [turn < 0 for turn in turns]
+    )
+    away: np.ndarray = np.minimum.reduce([_from_line(x, y, *side) for side in _sides(solid)])
     return np.where(inside, -away, away)
 
 

@@ -30,6 +30,7 @@ def prepare() -> None:
             setattr(sys, name, os.fdopen(number, "w" if number else "r"))
         if number and isinstance(stream := getattr(sys, name), io.TextIOWrapper):
             stream.reconfigure(errors="replace")
-    if isinstance(sys.stderr, io.TextIOWrapper) and sys.stderr is sys.__stderr__:  # not one of a test or a notebook
-        file = io.BufferedWriter(_Dropping(sys.stderr.fileno(), "w", closefd=False))
-        sys.stderr = io.TextIOWrapper(file, sys.stderr.encoding, "replace", line_buffering=True)
+    stderr = sys.__stderr__
+    if isinstance(stderr, io.TextIOWrapper) and sys.stderr is stderr:  # not one of a test or a notebook
+        file = io.BufferedWriter(_Dropping(stderr.fileno(), "w", closefd=False))
+        sys.stderr = io.TextIOWrapper(file, stderr.encoding, "replace", line_buffering=True)
