@@ -129,22 +129,20 @@ def find(name: str) -> type[Learner]:
     if name not in points:
         raise UserError(f"no learner '{name}'; {known(name, points)}")
     kind = load_point(points[name], f"the learner '{name}'")
-    if problem := _problem(kind):
-        raise UserError(f"the learner '{name}' ({points[name].value}) {problem}")
+    _check(kind, f"the learner '{name}' ({points[name].value})")
     return kind
 
 
-def _problem(kind: Any) -> str:
-    """Why an object is not the class of a learner; "" when it is."""
+def _check(kind: Any, what: str) -> None:
+    """Raise UserError, with `what` as its subject, for an object that is not the class of a learner."""
     if not (isinstance(kind, type) and issubclass(kind, Learner)):
-        return "is not a subclass of phototaxis_agent.learner.Learner"
+        raise UserError(f"{what} is not a subclass of phototaxis_agent.learner.Learner")
     options = getattr(kind, "Options", None)
     if not (isinstance(options, type) and issubclass(options, Struct)):
-        return "needs Options, a msgspec.Struct whose fields are its hyperparameters"
+        raise UserError(f"{what} needs Options, a msgspec.Struct whose fields are its hyperparameters")
     for method in ("values", "learn", "save", "load"):
         if getattr(kind, method) is getattr(Learner, method):
-            return f"has no method {method}"
-    return ""
+            raise UserError(f"{what} has no method {method}")
 
 
 def load_point(point: EntryPoint, what: str) -> Any:

@@ -162,10 +162,9 @@ class Arena(Struct, forbid_unknown_fields=True, frozen=True):
     """Where an episode may start."""
 
     def __post_init__(self) -> None:
-        from phototaxis.rules import problem  # needs NumPy, which messages do without
+        from phototaxis import rules  # needs NumPy, which messages do without
 
-        if found := problem(self):
-            raise ValueError(found)
+        rules.check(self)
 
     def boundary(self) -> list[Polygon]:
         """The four enclosing walls, 1 m thick, outside the room: its inside is exactly `size`."""

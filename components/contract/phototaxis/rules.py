@@ -23,10 +23,11 @@ MOST_STRIDES = 10_000
 """Steps of the solver in one control period."""
 
 
-def problem(arena: Arena) -> str:
-    """The first rule that an arena breaks, in one line: `KEY: expected …`; "" when it breaks none."""
+def check(arena: Arena) -> None:
+    """Raise ValueError with the first rule that an arena breaks, in one line: `KEY: expected …`."""
     rules = _name, _obstacles, _robot, _motion, _sensors, _lights
-    return next(chain.from_iterable(rule(arena) for rule in rules), "")
+    for broken in chain.from_iterable(rule(arena) for rule in rules):
+        raise ValueError(broken)
 
 
 def _name(arena: Arena) -> Iterator[str]:

@@ -9,12 +9,12 @@ _CELLS = 4096
 """Cells of the search for a bright place, at a time."""
 
 
-def too_dim(arena: Arena) -> str:
-    """That no light can ever count as reached, in one line; "" where one can."""
+def too_dim(arena: Arena) -> str | None:
+    """That no light can ever count as reached, in one line; None where one can."""
     noise = arena.sensing.noise
     brightest = (1 + noise) * _brightest(arena, REACHED / (1 + noise))
     if brightest > REACHED:
-        return ""
+        return None
     index = max(range(len(arena.lights)), key=lambda index: arena.lights[index].brightness)
     return (
         f"lights[{index}].brightness: no sensor can ever read more than {brightest:.3g}, "
