@@ -8,7 +8,7 @@ physics steps and the same readings.
 import random
 import time
 
-from aitk.robots import LightSensor, RangeSensor, Scribbler, World  # pyright: ignore[reportMissingImports]
+from aitk.robots import LightSensor, RangeSensor, Scribbler, World  # pyright: ignore[reportMissingImports] - installed by hand
 
 STEPS = 1000
 

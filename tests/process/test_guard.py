@@ -44,7 +44,7 @@ def guarded(request, start, certs):
     def place(role: str, world: str = "a") -> tuple[str, str]:
         return "--zenoh-config", str(folder / f"{world}.{role}.{request.param}.json5")
 
-    place.router, place.auth = router, request.param  # type: ignore[attr-defined]
+    place.router, place.auth = router, request.param  # type: ignore[attr-defined] - the tests ask the function for both
     return place
 
 

@@ -4,11 +4,12 @@ import os
 import socket
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from phototaxis.errors import Unavailable, UserError
 from phototaxis.fmu import FmuOptions
-from phototaxis.messages import Control, Status, World
+from phototaxis.messages import Control, Phase, Status, World
 from phototaxis.ports import find_ports, free_ports
 from phototaxis_agent.setup import make_setup
 from phototaxis_launcher import demo, swap
@@ -47,17 +48,18 @@ def test_a_watched_demo_begins_and_ends_slowly(monkeypatch: pytest.MonkeyPatch):
     now = [100.0]
     monkeypatch.setattr(demo.time, "monotonic", lambda: now[0])
     story = demo.Story(UpOptions(epochs=3000), FmuOptions(), stays=True, paced=True)
-    wire, said = Wire(), Said()
+    wire: Any = Wire()
+    said: Any = Said()
 
-    def at(epoch: int, phase: str = "paused", driver: str = "qtable-1", waiting_for: str = "") -> list[str]:
+    def at(epoch: int, phase: Phase = "paused", driver: str = "qtable-1", waiting_for: str = "") -> list[str]:
         wire.asked.clear()
-        status = Status(run="r", phase=phase, waiting_for=waiting_for, epoch=epoch, epochs=3000, driver=driver)  # pyright: ignore
-        story.follow(status, wire, said)  # pyright: ignore
+        status = Status(run="r", phase=phase, waiting_for=waiting_for, epoch=epoch, epochs=3000, driver=driver)
+        story.follow(status, wire, said)
         return [*wire.asked]
 
     def due() -> bool:
         wire.asked.clear()
-        story.beat(wire)  # pyright: ignore
+        story.beat(wire)
         return wire.asked == ["step"]
 
     assert at(0, "waiting", driver="") == ["pause"], "before anybody drives"
@@ -86,10 +88,11 @@ def test_a_watched_demo_begins_and_ends_slowly(monkeypatch: pytest.MonkeyPatch):
 
 def test_a_demo_that_nobody_watches_is_left_alone():
     story = demo.Story(UpOptions(epochs=3000), FmuOptions(), stays=False, paced=False)
-    wire, said = Wire(), Said()
+    wire: Any = Wire()
+    said: Any = Said()
     for epoch in range(0, 3001, 100):
-        story.follow(Status(run="r", phase="running", epoch=epoch, epochs=3000, driver="q"), wire, said)  # pyright: ignore
-        story.beat(wire)  # pyright: ignore
+        story.follow(Status(run="r", phase="running", epoch=epoch, epochs=3000, driver="q"), wire, said)
+        story.beat(wire)
     assert not wire.asked
     assert not said
 
@@ -208,8 +211,8 @@ def test_the_first_agent_waits_for_all_others(processes: Processes):
 
 
 def test_a_slow_or_silent_part_is_named_once(tmp_path: Path):
-    said = Said()
-    news = News(said, RunFolder(tmp_path), FmuOptions(light_fmu="lag.fmu"))  # pyright: ignore
+    said: Any = Said()
+    news = News(said, RunFolder(tmp_path), FmuOptions(light_fmu="lag.fmu"))
     silent = Status(run="r", phase="waiting", driver="q-1", waited=6.0, tick=3)
     for status in (silent, silent, Status(run="r", phase="running", driver="q-1"), silent):
         news.follow(status)

@@ -201,7 +201,7 @@ def test_no_recording_is_overwritten(tmp_path: Path):
 def test_ticks_without_a_command_are_told_in_a_few_lines(tmp_path: Path, paper: Arena):
     recording, told = rr.RecordingStream("test"), []
     translator = Translator(recording, World(run="r", arena=paper, seed=0, epochs=0))
-    translator._text = lambda tick, text, *_: told.append(text)  # type: ignore[method-assign]
+    translator._text = lambda tick, text, *_: told.append(text)  # type: ignore[method-assign] - heard in place of Rerun
     for tick, late in enumerate([0, 0, 1, 1, 3, 4, 5, 6]):
         at = [0.0]
         translator.sim(SimLog(

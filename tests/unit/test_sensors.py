@@ -101,8 +101,9 @@ def test_models_of_an_installed_package_are_found_by_its_entry_point(tmp_path: P
     monkeypatch.setattr(choice, "entry_points", lambda group: Distribution.at(about).entry_points.select(group=group))
     with choice.choose(FmuOptions(light_fmu="some.fmu")) as models:
         assert type(models).__name__ == "Blind"
-        assert not models.closed  # pyright: ignore
-    assert models.closed == [models]  # pyright: ignore
+        closed: list[object] = vars(type(models))["closed"]
+        assert not closed
+    assert closed == [models]
     with choice.choose(FmuOptions()) as models:
         assert type(models) is choice.BuiltInChoice
     with pytest.raises(UserError, match=r"'broken' need the package blind_gone; install it .*'phototaxis\[broken\]'"):

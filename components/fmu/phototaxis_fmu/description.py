@@ -15,7 +15,7 @@ from fmpy.model_description import (
     ValidationError,
     read_model_description,
 )
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] - it has no stubs
 from phototaxis.errors import UserError
 
 LARGEST = 2_000_000_000
