@@ -9,7 +9,7 @@ import pytest
 import rerun as rr
 from disks import no_file_larger_than
 from phototaxis.arena import Arena, Light, Wall
-from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
+from phototaxis.messages import AgentLog, EndedEpisode, SensorsLog, SimLog, World
 from phototaxis.ports import free_ports
 from phototaxis.recordings import Recording as Listed
 from phototaxis.recordings import Summary, summary_file
@@ -213,7 +213,7 @@ def test_the_papers_line_stands_beside_the_papers_system_alone(
     recording = rr.RecordingStream("phototaxis", recording_id="r")
     recording.save(str(tmp_path / "r.rrd"))
     translator = Translator(recording, World("r", msgspec.structs.replace(paper, name=arena), 0, 0))
-    ended = Episode(run="r", episode=0, tick=1, steps=1, end="reached", driver="a", x=0.0, y=0.0, heading=0.0)
+    ended = EndedEpisode(run="r", episode=0, tick=1, steps=1, end="terminated", driver="a", x=0.0, y=0.0, heading=0.0)
     none, one = [0, 0], [1.0, 1.0]
     translator.sim(SimLog("r", 0, "s", "a", [0, 1], none, one, one, one, one, one, one, none, [ended]))
     translator.sensors(SensorsLog("r", 0, "s", "built-in", light, [0, 1], [1.0] * 32, [0.5] * 4))

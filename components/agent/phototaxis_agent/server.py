@@ -27,8 +27,8 @@ from phototaxis.messages import (
     World,
 )
 from phototaxis.protocol import Once
+from phototaxis.seated import SeatedAgent
 
-from phototaxis_agent.agent import Agent
 from phototaxis_agent.many import Flock
 from phototaxis_agent.stuck import watched
 
@@ -47,11 +47,11 @@ class Session:
     """The agent in one run."""
 
     world: World
-    agent: Agent
+    agent: SeatedAgent
     answer: Once[Any]
 
 
-def _answering(world: World, agent: Agent) -> Once[Any]:
+def _answering(world: World, agent: SeatedAgent) -> Once[Any]:
     """What answers each tick of a world once; of many robots' memories nothing is inherited but what was learned."""
     return Once(Flock(agent, world.robots)) if world.robots > 1 else Once(agent, agent.tick, agent.command)
 
@@ -78,7 +78,7 @@ class Server:
     def __init__(
         self,
         bus: Bus,
-        make: Callable[[World], Agent],
+        make: Callable[[World], SeatedAgent],
         path: Path | None,
         resume: Path | None,
         required: bool,
@@ -311,7 +311,7 @@ class Server:
                 session.answer(readings)
                 self._record(session.agent)
 
-    def _keep(self, journal: Journal, agent: Agent, entry: bytes) -> None:
+    def _keep(self, journal: Journal, agent: SeatedAgent, entry: bytes) -> None:
         """Add to the journal; a full one is given up, which frees its space for the checkpoint that replaces it."""
         for tried_before in (False, True):
             try:
@@ -324,14 +324,14 @@ class Server:
             if not tried_before:
                 self._save(agent)
 
-    def _save(self, agent: Agent, last: bool = False) -> UserError | None:
+    def _save(self, agent: SeatedAgent, last: bool = False) -> UserError | None:
         """Write the checkpoint and begin the journal anew; why that is not possible now."""
         self._save_at = time.monotonic() + SAVE_EVERY
         if self._path is None or (agent.tick == self._saved and (self._journal is None or self._journal.kept)):
             return None
         meta, arrays = agent.checkpoint()
         if last:
-            agent.learner.prove(arrays)
+            agent.prove(arrays)
         try:
             save(self._path, meta, arrays)
         except Unavailable as fault:
@@ -352,12 +352,12 @@ class Server:
             self._warned = True
             warn(f"{self._bus.ident}: {fault}; if it dies now, what it learned since its last checkpoint is lost")
 
-    def _record(self, agent: Agent) -> None:
+    def _record(self, agent: SeatedAgent) -> None:
         self._log.add((agent, agent.tick[1], *agent.last), time.monotonic())
 
     def _chunk(self, seq: int, columns: list[Any]) -> AgentLog:
         agents, tick, state, action, reward, error, temperature = columns
-        agent: Agent = agents[0]
+        agent: SeatedAgent = agents[0]
         log = AgentLog(
             agent.tick[0], seq, self._bus.ident, agent.name, agent.task.percept,
             tick, state, action, reward, error, temperature,

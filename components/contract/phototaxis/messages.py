@@ -24,8 +24,8 @@ Count = Annotated[int, Meta(ge=0, le=2**53)]
 """What JSON readers of all languages keep exactly."""
 Seed = Count
 
-End = Literal["", "reached", "cap", "asked"]
-"""How an episode ends: it goes on, the light was reached (terminated), the step cap (truncated), by request."""
+End = Literal["", "terminated", "truncated", "reset"]
+"""How an episode ends: not at all, at the light, after its full number of steps, or by request."""
 
 
 class Message(Struct, forbid_unknown_fields=True, kw_only=True):
@@ -168,10 +168,11 @@ class CommandOfMany(Message):
     """(N,) float64 in −1..1."""
     right: bytes
     end: bytes
-    """(N,) uint8: 0 drive on, else the episode's end: 1 reached, 2 cap, 3 asked. The robot is then placed anew."""
+    """(N,) uint8: 0 drive on, else the episode's end, after which the robot is placed anew: 1 terminated, 2 truncated,
+    3 reset."""
 
 
-class Episode(Message):
+class EndedEpisode(Message):
     """One episode, when it has ended."""
 
     run: Name
@@ -324,7 +325,7 @@ class LaunchReply(Message):
 
 
 Column = list[float]
-ENDS: tuple[End, ...] = ("", "reached", "cap", "asked")
+ENDS: tuple[End, ...] = ("", "terminated", "truncated", "reset")
 """By the number that `CommandOfMany` has for them."""
 
 
@@ -355,7 +356,7 @@ class SimLog(Message):
     right: Column
     contact: list[int]
     """0 none, 1 front, 2 rear, 3 both."""
-    ended: list[Episode]
+    ended: list[EndedEpisode]
     late: Count = 0
     """Ticks so far that ended by the clock before their command came, as in the status."""
 

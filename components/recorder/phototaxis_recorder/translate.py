@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
+from phototaxis.messages import AgentLog, EndedEpisode, SensorsLog, SimLog, World
 from phototaxis.recordings import Summary
 from phototaxis.task import ACTIONS, PERCEPTS
 
@@ -21,7 +21,7 @@ PATIENCE = 4000
 """Rows of one role that may wait for another's."""
 BEHIND = 64
 """A role this many ticks behind the newest is not waited for, but asked."""
-WORDS = {"reached": "reached the light", "cap": "gave up", "asked": "was reset"}
+WORDS = {"terminated": "reached the light", "truncated": "gave up", "reset": "was reset"}
 
 
 class Translator:
@@ -37,7 +37,7 @@ class Translator:
         self._mounts = np.array([sonar.position for sonar in world.arena.robot.sonars])
         self._newest = {"sim": -1, "sensors": -1, "agent": -1}
         self._rows: dict[str, list[tuple[Any, ...]]] = {"sim": [], "sensors": [], "agent": []}
-        self._episodes: list[Episode] = []
+        self._episodes: list[EndedEpisode] = []
         self._episode = -1
         self._recent: deque[bool] = deque(maxlen=50)
         self._driver = ""
@@ -126,7 +126,7 @@ class Translator:
             self._at(self._newest["sensors"] + 1)
             rr.log("world/robot/sonar", rr.Clear(recursive=False), recording=self._recording)
         for episode in self._episodes:
-            self._recent.append(episode.end == "reached")
+            self._recent.append(episode.end == "terminated")
             steps = "step" if episode.steps == 1 else "steps"
             self._text(
                 episode.tick,

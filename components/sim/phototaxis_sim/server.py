@@ -278,7 +278,7 @@ class Server:
         elif verb == "reset":
             if self._finished or self._sim.finished:
                 return "the run is finished"
-            self._apply(Entry(0.0, 0.0, self._seat.driver, "asked"))
+            self._apply(Entry(0.0, 0.0, self._seat.driver, "reset"))
         elif verb == "begin":
             self._begin(request.seed)
         elif verb == "stop":

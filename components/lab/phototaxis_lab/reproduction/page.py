@@ -154,10 +154,11 @@ def hyperparameters() -> str:
     for system, _ in WHOLE.values():
         setup = system.setup()
         options = msgspec.to_builtins(setup.hyperparameters) | msgspec.to_builtins(setup.exploration)
+        options["max_episode_steps"] = setup.task.max_episode_steps
         words = ", ".join(
             f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}" for name, value in options.items()
         )
-        row = f"| {setup.learner}, {setup.task.percept}, {setup.task.scheme().scheme} | {words}, cap {setup.task.cap} |"
+        row = f"| {setup.learner}, {setup.task.percept}, {setup.task.scheme().scheme} | {words} |"
         if row not in seen:
             seen.add(row)
             rows.append(row)
