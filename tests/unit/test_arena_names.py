@@ -46,7 +46,7 @@ def learned(arena: str) -> None:
 
 
 def measured(*words: str) -> int:
-    return evaluate.main(["c.npz", "--placements=3", "--max_episode_steps=2", *words])
+    return evaluate.main(["c.npz", "--placements=3", "--max-episode-steps=2", *words])
 
 
 def test_a_changed_copy_of_a_shipped_arena_is_not_taken_for_it(folder):
@@ -103,7 +103,7 @@ def test_an_agent_that_meets_another_world_goes_on_there(paper: Arena):
     agent.enter(other)
     meta, _ = agent.checkpoint()
     assert (meta.arena, meta.arena_digest) == ("other", other.digest)
-    assert agent._near == 0.7
+    assert agent.policy.near == 0.7
 
 
 def test_recordings_of_two_worlds_with_one_name_are_told_apart():

@@ -12,6 +12,7 @@ from phototaxis.task import (
     FORWARD,
     MOVING,
     PERCEPTS,
+    REWARDS,
     Episode,
     LightHistory,
     TaskOptions,
@@ -127,7 +128,7 @@ def test_rewards(scheme, before, now, unchanged, reward):
 def test_the_first_observation_of_an_episode_earns_nothing():
     episode = Episode(100)
     episode.begin(readings(light=(0.96, 0.2), front=True))
-    assert {TaskOptions(percept=percept).scheme()(episode) for percept in PERCEPTS} == {0.0}
+    assert {reward(episode) for reward in REWARDS.values()} == {0.0}
 
 
 def test_commands_have_numbers_and_others_have_none():

@@ -106,8 +106,7 @@ class SeatedAgent:
         """
         episode = self.episode
         episode.run, episode.tick, episode.number = meta.run, meta.tick, meta.episode
-        episode.history.steps = meta.steps
-        episode.history.lights.extend(meta.lights)
+        episode.history.restore(meta.lights, meta.steps)
         self.command = None
         if meta.answer is not None:
             left, right, end = meta.answer

@@ -21,6 +21,7 @@ class Episode:
     Attributes
     ----------
     now : the newest observation.
+    terminated : whether the robot is at the light.
     history : the light readings up to `now`.
     run, number, tick : of the newest readings that were followed; "", −1 and −1 before the first.
     """
@@ -28,17 +29,18 @@ class Episode:
     def __init__(self, max_episode_steps: float, robots: int | None = None):
         self.history = LightHistory(robots)
         self.now: Any = None
+        self.terminated: Any = False
         self.run, self.number, self.tick = "", -1, -1
         self._max_episode_steps = max_episode_steps
 
     def begin(self, observation: Any, which: Any = True) -> None:
         """Begin an episode with this observation; the robots outside of the mask `which` (N,) go on with theirs."""
-        self.now = observation
+        self.now, self.terminated = observation, at_goal(observation)
         self.history.begin(observation.light, which)
 
     def step(self, observation: Any) -> None:
         """Take in the observation after one more step."""
-        self.now = observation
+        self.now, self.terminated = observation, at_goal(observation)
         self.history.step(observation.light)
 
     def follow(self, readings: Readings) -> None:
@@ -51,11 +53,6 @@ class Episode:
     def steps(self) -> Any:
         """Steps since the episode began; 0 at its first observation."""
         return self.history.steps
-
-    @property
-    def terminated(self) -> Any:
-        """Whether the robot is at the light."""
-        return at_goal(self.now)
 
     @property
     def truncated(self) -> Any:

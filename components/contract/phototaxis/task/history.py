@@ -1,6 +1,7 @@
 """The light readings of an episode's last steps."""
 
 from collections import deque
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -33,17 +34,25 @@ class LightHistory:
         dark: Any = (0.0, 0.0) if robots is None else np.zeros((2, robots))
         self.lights: deque[Any] = deque([dark] * UNCHANGED_STEPS, UNCHANGED_STEPS)
         self.steps: Any = 0 if robots is None else np.zeros(robots, int)
+        self._unchanged: Any = None
 
     def begin(self, light: Any, which: Any = True) -> None:
         """Begin an episode with this reading; for the robots outside of the mask `which` (N,) nothing happens."""
         first = self.arithmetic.first
         self.lights.extend([first([(which, light)], past) for past in self.lights])
         self.steps = first([(which, 0)], self.steps)
+        self._unchanged = None
 
     def step(self, light: Any) -> None:
         """Add the reading of one more step."""
         self.lights.append(light)
         self.steps = self.steps + 1
+        self._unchanged = None
+
+    def restore(self, lights: Iterable[Any], steps: Any) -> None:
+        """Go on with the `lights` and `steps` of another history."""
+        self.lights.extend(lights)
+        self.steps, self._unchanged = steps, None
 
     @property
     def before(self) -> Any:
@@ -62,10 +71,12 @@ class LightHistory:
 
         The last five readings of the episode lie within 0.01 of each other, on both sides.
         """
-        largest, smallest = self.arithmetic.largest, self.arithmetic.smallest
-        left, right = zip(*self.lights, strict=True)
-        return (
-            (self.steps >= UNCHANGED_STEPS - 1)
-            & (largest(*left) - smallest(*left) <= EQUAL_LIGHT)
-            & (largest(*right) - smallest(*right) <= EQUAL_LIGHT)
-        )
+        if self._unchanged is None:  # percepts and rewards both ask for it
+            largest, smallest = self.arithmetic.largest, self.arithmetic.smallest
+            left, right = zip(*self.lights, strict=True)
+            self._unchanged = (
+                (self.steps >= UNCHANGED_STEPS - 1)
+                & (largest(*left) - smallest(*left) <= EQUAL_LIGHT)
+                & (largest(*right) - smallest(*right) <= EQUAL_LIGHT)
+            )
+        return self._unchanged
