@@ -12,7 +12,7 @@ from phototaxis.arena import Arena
 from phototaxis.checkpoint import decode, encode
 from phototaxis.errors import UserError
 from phototaxis.messages import World
-from phototaxis.task import CrowdReadings
+from phototaxis.task import BatchObservation
 from phototaxis_gym.place import Here
 from phototaxis_gym.policy import PolicyAgent, PolicyFile
 from phototaxis_gym.sb3 import Robots
@@ -25,7 +25,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecFrameStack, VecMonitor, VecNormalize
 
 NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
-CAP = 12
+MAX_STEPS = 12
 
 
 @pytest.fixture(autouse=True)
@@ -51,7 +51,7 @@ def save(
 
 
 def agent(file: Path, paper: Arena, **more: Any) -> PolicyAgent:
-    return PolicyFile(file, trusted=True, **more)(World(run="x", arena=paper, seed=5, epochs=0), CAP)
+    return PolicyFile(file, trusted=True, **more)(World(run="x", arena=paper, seed=5, epochs=0), MAX_STEPS)
 
 
 def drive(agents: list[PolicyAgent], paper: Arena, ticks: int) -> list[list[tuple[float, float, str]]]:
@@ -68,7 +68,7 @@ def drive(agents: list[PolicyAgent], paper: Arena, ticks: int) -> list[list[tupl
 
 def expected(model: Any, ticks: int, normalize: Any = lambda seen: seen, **options: Any) -> list[tuple]:
     """The commands that `predict` chooses as its documentation has it, for the same placements."""
-    environment: Any = gymnasium.make(NAME, cap=CAP, **options)
+    environment: Any = gymnasium.make(NAME, max_episode_steps=MAX_STEPS, **options)
     seen, _ = environment.reset(seed=5)
     found, memory, start = list[tuple](), None, True
     while len(found) < ticks:
@@ -77,10 +77,10 @@ def expected(model: Any, ticks: int, normalize: Any = lambda seen: seen, **optio
         )
         seen, _, terminated, truncated, _ = environment.step(action)
         start = terminated or truncated
-        readings = environment.unwrapped._readings
+        readings = environment.unwrapped._episode.now
         found.append((readings.left, readings.right, ""))
         if start:
-            found.append((0.0, 0.0, "reached" if terminated else "cap"))
+            found.append((0.0, 0.0, "terminated" if terminated else "truncated"))
             seen, _ = environment.reset()
     return found[:ticks]
 
@@ -118,9 +118,9 @@ def test_a_successor_inherits_the_memory(paper, tmp_path):
     first, second = agent(file, paper), agent(file, paper)
     drive([first], paper, 7)
     second.restore(*decode(encode(*first.checkpoint()), "first"), "first")
-    for hidden, other in zip(first.hidden or (), second.hidden or (), strict=True):
+    for hidden, other in zip(first.policy.hidden or (), second.policy.hidden or (), strict=True):
         np.testing.assert_array_equal(hidden, other)
-    assert first.hidden is not None
+    assert first.policy.hidden is not None
     other = agent(save(PPO, tmp_path), paper)
     with pytest.raises(UserError, match="first: its memory does not fit the policy in"):
         other.restore(*first.checkpoint(), "first")
@@ -133,7 +133,7 @@ def test_many_robots_are_driven_as_one(paper, tmp_path):
     place = Here(paper)
     readings = place.begin(5)
     for _ in range(8):
-        rows = CrowdReadings(
+        rows = BatchObservation(
             np.array([readings.sonar, [8.0] * 16]).T, np.array([readings.light, (0.1, 0.2)]).T,
             np.array([readings.front, False]), np.array([readings.rear, True]),
         )  # fmt: skip
@@ -238,7 +238,7 @@ def test_a_policy_of_a_class_of_ones_own_is_recognised(paper, tmp_path):
 
 def test_evaluate_takes_such_files(tmp_path, capsys):
     file, _ = normalized(tmp_path)
-    words = [str(file), "--placements", "3", "--cap", "5", "--json"]
+    words = [str(file), "--placements", "3", "--max-episode-steps", "5", "--json"]
     for more, line in (
         ([], "add --trust"),
         (["--trust"], "needs its statistics"),
@@ -253,9 +253,9 @@ def test_evaluate_takes_such_files(tmp_path, capsys):
 
 
 def test_stable_baselines_counts_successes(tmp_path):
-    robots = make_vec_env(NAME, n_envs=2, seed=1, env_kwargs={"percept": "continuous", "cap": 30})
+    robots = make_vec_env(NAME, n_envs=2, seed=1, env_kwargs={"percept": "continuous", "max_episode_steps": 30})
     judge = EvalCallback(
-        make_vec_env(NAME, n_envs=2, env_kwargs={"cap": 30, "percept": "continuous"}),
+        make_vec_env(NAME, n_envs=2, env_kwargs={"max_episode_steps": 30, "percept": "continuous"}),
         n_eval_episodes=4,
         eval_freq=64,
         verbose=0,
@@ -270,7 +270,7 @@ def test_stable_baselines_counts_successes(tmp_path):
 
 def test_many_robots_are_a_vecenv_of_stable_baselines(quiet):
     """Step by step as its own loop over single robots, with the last observations of episodes."""
-    options = {"percept": "sensors", "arena": quiet, "cap": 15}
+    options = {"percept": "sensors", "arena": quiet, "max_episode_steps": 15}
     ours, theirs = Robots(3, **options), make_vec_env(NAME, n_envs=3, env_kwargs=options)
     rng, ends = np.random.default_rng(0), 0
     for environment in (ours, theirs):
@@ -290,6 +290,12 @@ def test_many_robots_are_a_vecenv_of_stable_baselines(quiet):
             assert one["is_success"] == other["is_success"]
             assert one["TimeLimit.truncated"] == other["TimeLimit.truncated"]
     assert ends > 8
-    model = PPO("MlpPolicy", VecMonitor(Robots(4, percept="continuous", cap=20)), device="cpu", n_steps=32, n_epochs=1)
+    model = PPO(
+        "MlpPolicy",
+        VecMonitor(Robots(4, percept="continuous", max_episode_steps=20)),
+        device="cpu",
+        n_steps=32,
+        n_epochs=1,
+    )
     model.learn(256)
     assert len(model.ep_success_buffer or ()) > 2

@@ -8,7 +8,7 @@ from typing import Any, NoReturn, TypeVar
 import numpy as np
 from phototaxis.checkpoint import learner_hash, storable
 from phototaxis.errors import ComponentFailed, UserError
-from phototaxis.task import Percept, State
+from phototaxis.task import Percept, PerceptState
 
 from phototaxis_agent.learner import Learner, Transition
 
@@ -57,7 +57,7 @@ class CheckedLearner(Learner):
         other.__dict__.update(self.__dict__, _where=where)
         return other
 
-    def values(self, state: State) -> list[float]:
+    def values(self, state: PerceptState) -> list[float]:
         try:
             values = self._learner.values(state)
         except BaseException as error:
