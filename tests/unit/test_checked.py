@@ -18,7 +18,7 @@ from phototaxis.checkpoint import encode
 from phototaxis.codec import encode as on_the_wire
 from phototaxis.errors import ComponentFailed, UserError
 from phototaxis.messages import AgentLog
-from phototaxis.task import BatchObservation, TaskOptions
+from phototaxis.task import BatchObservation, Episode, TaskOptions
 from phototaxis_agent import policy as module
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.crowd import CrowdAgent
@@ -304,7 +304,9 @@ def test_a_learner_cannot_change_the_states_of_a_crowd(make, paper: Arena):
     crowd = CrowdAgent(agent.policy, 0.4, 3, 0)
     evaluate(paper, agent.policy, 3, 0, max_episode_steps=2)
     dark, free = np.zeros(3), np.zeros(3, bool)
-    crowd(BatchObservation(np.full((16, 3), 5.0), np.stack([dark, dark]), free, free))
+    episode = Episode(100, 3)
+    episode.begin(BatchObservation(np.full((16, 3), 5.0), np.stack([dark, dark]), free, free))
+    crowd(episode)
     assert not (crowd._state == 5.0).any()
 
 

@@ -8,7 +8,7 @@ import pytest
 from making import readings
 from phototaxis.arena import Arena
 from phototaxis.messages import World
-from phototaxis.task import ACTIONS, PERCEPTS, BatchObservation, LightHistory
+from phototaxis.task import MOTORS, PERCEPTS, BatchObservation, Episode, LightHistory
 from phototaxis_agent.crowd import columns, draw_many
 from phototaxis_agent.exploration import draw
 from phototaxis_agent.setup import make_setup
@@ -42,7 +42,7 @@ def test_a_crowd_moves_as_each_robot_would_alone(name):
                 pose = alone[row].random_pose(rng)
                 crowd.place(row, pose)
                 alone[row].place(pose)
-        motors = np.array(ACTIONS)[rng.integers(9, size=COUNT)] if tick % 20 > 10 else np.ones((COUNT, 2))
+        motors = MOTORS[rng.integers(9, size=COUNT)] if tick % 20 > 10 else np.ones((COUNT, 2))
         crowd.drive(*motors.T)
         motions = [physics.drive(*command) for physics, command in zip(alone, motors.tolist(), strict=True)]
         difference = crowd.poses - np.array([motion.pose for motion in motions])
@@ -127,8 +127,8 @@ def test_the_direct_way_is_turning_and_driving(paper: Arena):
     assert direct_steps(paper, Pose(4, 5, 0)) == 1
 
 
-def scripted(motors: tuple[float, float]) -> Callable[[BatchObservation], np.ndarray]:
-    return lambda readings: np.tile(motors, (len(readings.front), 1))
+def scripted(motors: tuple[float, float]) -> Callable[[Episode], np.ndarray]:
+    return lambda episode: np.tile(motors, (len(episode.now.front), 1))
 
 
 def test_success_is_counted_where_the_light_is_reached(paper: Arena):

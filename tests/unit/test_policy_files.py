@@ -10,13 +10,18 @@ import pytest
 import torch
 from phototaxis.arena import Arena
 from phototaxis.checkpoint import decode, encode
+from phototaxis.columns import FLAG, pack, unpack
 from phototaxis.errors import UserError
-from phototaxis.messages import World
-from phototaxis.task import BatchObservation
+from phototaxis.messages import ENDS, Readings, ReadingsOfMany, World
+from phototaxis.task import BatchObservation, Episode
+from phototaxis.task.episode import RESET
+from phototaxis_agent.many import Flock
 from phototaxis_gym.place import Here
 from phototaxis_gym.policy import PolicyAgent, PolicyFile
 from phototaxis_gym.sb3 import Robots
 from phototaxis_lab import evaluate
+from phototaxis_sensors.crowd import CrowdSuite
+from phototaxis_sim.many import SimulationOfMany
 from sb3_contrib import ARS, QRDQN, TQC, TRPO, CrossQ, MaskablePPO, RecurrentPPO
 from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3
 from stable_baselines3.common.callbacks import EvalCallback
@@ -118,9 +123,9 @@ def test_a_successor_inherits_the_memory(paper, tmp_path):
     first, second = agent(file, paper), agent(file, paper)
     drive([first], paper, 7)
     second.restore(*decode(encode(*first.checkpoint()), "first"), "first")
-    for hidden, other in zip(first.policy.hidden or (), second.policy.hidden or (), strict=True):
+    for hidden, other in zip(first.hidden or (), second.hidden or (), strict=True):
         np.testing.assert_array_equal(hidden, other)
-    assert first.policy.hidden is not None
+    assert first.hidden is not None
     other = agent(save(PPO, tmp_path), paper)
     with pytest.raises(UserError, match="first: its memory does not fit the policy in"):
         other.restore(*first.checkpoint(), "first")
@@ -130,16 +135,46 @@ def test_many_robots_are_driven_as_one(paper, tmp_path):
     """In an evaluation: each robot has a memory of its own."""
     file = save(RecurrentPPO, tmp_path, "MlpLstmPolicy")
     crowd, alone = PolicyFile(file, trusted=True).crowd(paper), agent(file, paper)
-    place = Here(paper)
+    place, episode = Here(paper), Episode(MAX_STEPS, 2)
     readings = place.begin(5)
-    for _ in range(8):
+    for step in range(8):
         rows = BatchObservation(
             np.array([readings.sonar, [8.0] * 16]).T, np.array([readings.light, (0.1, 0.2)]).T,
             np.array([readings.front, False]), np.array([readings.rear, True]),
         )  # fmt: skip
         command = alone(readings)
-        np.testing.assert_allclose(crowd(rows)[0], (command.left, command.right), atol=1e-6)
+        (episode.step if step else episode.begin)(rows)
+        np.testing.assert_allclose(crowd(episode)[0], (command.left, command.right), atol=1e-6)
         readings = place.drive(command.left, command.right)
+
+
+def test_a_policy_drives_the_robots_of_a_world_each_in_its_own_episode(paper, tmp_path):
+    file = save(RecurrentPPO, tmp_path, "MlpLstmPolicy")
+    simulation = SimulationOfMany(paper, 5, "x", robots=3)
+    suite, flock = CrowdSuite(simulation.world), Flock(agent(file, paper), 3)
+    alone = [agent(file, paper) for _ in range(3)]
+    for _ in range(2 * MAX_STEPS):
+        state = simulation.state
+        sonar, light = suite(state.tick, simulation.poses)
+        command = flock(
+            ReadingsOfMany(
+                run="x", tick=state.tick, epoch=state.epoch, episode=state.episode, sonar=pack(sonar),
+                light=pack(light), contact=state.contact, left=state.left, right=state.right, author="", driver="",
+            )
+        )  # fmt: skip
+        ends = unpack(command.end, 3, kind=FLAG)
+        for row, one in enumerate(alone):
+            answer = one(
+                Readings(
+                    run="x", tick=state.tick, episode=simulation.episode[row], epoch=state.epoch,
+                    sonar=sonar[:, row].tolist(), light=tuple(light[:, row].tolist()), front=simulation.front[row],
+                    rear=simulation.rear[row], left=0.0, right=0.0, author="", driver="",
+                )
+            )  # fmt: skip
+            motors = unpack(command.left, 3)[row], unpack(command.right, 3)[row]
+            assert (*motors, ENDS[ends[row]]) == (answer.left, answer.right, answer.end)
+        reset = pack(np.array([0, RESET, 0]), FLAG)  # so that the episodes end at different ticks
+        simulation.advance(command.left, command.right, "x", reset if state.tick == 5 else command.end)
 
 
 def normalized(folder: Path, **more: Any) -> tuple[Path, VecNormalize]:

@@ -48,11 +48,8 @@ class Agent(SeatedAgent):
         return step, (0.0, 0.0) if over else ACTIONS[action]
 
     def another(self) -> Self:
-        """An agent for one more robot, which learns into the same values."""
         self.policy.shared = True
-        other = type(self)(self.policy)
-        other.author = self.author
-        return other
+        return type(self)(self.policy)
 
     def enter(self, arena: Arena) -> None:
         super().enter(arena)

@@ -3,6 +3,7 @@
 import sys
 import traceback
 from collections.abc import Callable, Mapping
+from copy import copy
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
@@ -53,8 +54,8 @@ class CheckedLearner(Learner):
 
     def seen_from(self, where: Callable[[], str]) -> "CheckedLearner":
         """The same learner for a host that counts steps of its own."""
-        other = CheckedLearner.__new__(CheckedLearner)
-        other.__dict__.update(self.__dict__, _where=where)
+        other = copy(self)
+        other._where = where
         return other
 
     def values(self, state: PerceptState) -> list[float]:

@@ -1,7 +1,7 @@
 """A frozen policy for many robots at once: the same percepts, values and draws as `Agent`, in arrays."""
 
 import numpy as np
-from phototaxis.task import MOTORS, BatchObservation, LightHistory
+from phototaxis.task import MOTORS, Episode
 
 from phototaxis_agent.policy import Policy
 
@@ -21,21 +21,17 @@ class CrowdAgent:
         self._percept, self._near, self._step = policy.percept, near, 0
         self._temperature = policy.exploration.cold
         self._rng = np.random.default_rng(seed)
-        self._history = LightHistory(count)
         self._context = np.tile(np.array(policy.learner.context, dtype=float), (count, 1))
         self._state = np.empty((count, 0))
         self._action = np.zeros(count, int)
 
-    def __call__(self, observation: BatchObservation) -> np.ndarray:
+    def __call__(self, episode: Episode) -> np.ndarray:
         """The motor commands (N, 2) of one tick."""
-        history, count = self._history, len(observation.front)
-        if self._step == 0:
-            history.begin(observation.light)
-        else:
-            history.step(observation.light)
+        history, count = episode.history, len(self._action)
+        if self._step:
             remembered = self._learner.remember(tuple(self._state.T.copy()), self._action.copy(), history.gain)
             self._context = columns(remembered, count)
-        percept = columns(self._percept.state(observation, history, self._near), count)
+        percept = columns(self._percept.state(episode.now, history, self._near), count)
         self._state = np.concatenate([percept, self._context], axis=1)
         choice = draw_many(self._learner.values_of(self._state), self._temperature, self._rng.random(count))
         self._action = np.array(self._percept.actions)[choice]

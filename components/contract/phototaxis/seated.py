@@ -6,7 +6,6 @@ import numpy as np
 
 from phototaxis.arena import Arena
 from phototaxis.checkpoint import Meta, learner_hash
-from phototaxis.errors import UserError
 from phototaxis.messages import ENDS, Command, Readings
 from phototaxis.task import Episode, TaskOptions
 
@@ -66,14 +65,8 @@ class SeatedAgent:
         return self.command
 
     def another(self) -> Self:
-        """An agent for one more robot, with the same policy and an episode of its own.
-
-        Raises
-        ------
-        UserError
-            when the policy drives one robot only.
-        """
-        raise UserError(f"{self.name} drives one robot only")
+        """An agent for one more robot, with the same policy and an episode of its own."""
+        raise NotImplementedError
 
     def enter(self, arena: Arena) -> None:
         """Go on in an arena."""

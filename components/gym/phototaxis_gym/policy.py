@@ -1,7 +1,7 @@
 """A policy that Stable-Baselines3 has learned, in the driver's seat: frozen, and an agent like others."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from gymnasium import spaces
@@ -11,19 +11,22 @@ from phototaxis.errors import UserError
 from phototaxis.messages import Readings, World
 from phototaxis.options import convert
 from phototaxis.seated import SeatedAgent, Step
-from phototaxis.task import ACTIONS, MOTORS, BatchObservation, LightHistory, Observation, TaskOptions, action_of
+from phototaxis.task import ACTIONS, MOTORS, Episode, TaskOptions, action_of
 
 from phototaxis_gym.policy_file import Normalize, load, normalizer, was_normalized
 from phototaxis_gym.spaces import observer, rewards
 
 PERCEPTS = ("simple", "rich", "continuous", "sensors")
 
+Hidden = tuple[np.ndarray, ...] | None
+"""What a recurrent policy remembers of the episodes of the robots that it drives together; None for nothing yet."""
+
 
 class Policy:
     """A frozen policy for N robots: from what they sense to their motor commands, as it was trained.
 
-    Which percept and which actions it has follows from the model's spaces. What a recurrent policy remembers is begun
-    anew with each robot's episode.
+    Which percept and which actions it has follows from the model's spaces. It may drive any number of robots: what a
+    recurrent policy remembers of them is kept by its caller.
 
     Raises
     ------
@@ -40,31 +43,30 @@ class Policy:
             raise UserError(f"{file}: {theirs}: not the spaces of an environment of phototaxis{wrapped(space, arena)}")
         self._model, self.file, self._normalize = model, file, normalize
         self._observe, self._dtype = observer(self.percept, arena), space.dtype
-        self.hidden: tuple[np.ndarray, ...] | None = None
-        """What a recurrent policy remembers of the episode."""
 
-    def motors(self, observation: Observation, history: LightHistory, starts: np.ndarray) -> np.ndarray:
-        """(N, 2): the motor commands; `starts` (N,) says whose episode begins."""
-        seen = np.asarray(self._observe(observation, history), self._dtype)
+    def motors(self, episode: Episode, hidden: Hidden) -> tuple[np.ndarray, Hidden]:
+        """The motor commands (N, 2) after the newest observation of N robots, and what is remembered from now on."""
+        starts = np.atleast_1d(episode.steps == 0)
+        seen = np.asarray(self._observe(episode.now, episode.history), self._dtype)
         seen = seen.reshape(len(starts), *self._model.observation_space.shape)
         if self._normalize is not None:
             seen = self._normalize(seen)
-        chosen, self.hidden = self._model.predict(seen, self.hidden, episode_start=starts, deterministic=True)
-        return MOTORS[chosen] if self._discrete else np.asarray(chosen, float)
+        chosen, hidden = self._model.predict(seen, hidden, episode_start=starts, deterministic=True)
+        return MOTORS[chosen] if self._discrete else np.asarray(chosen, float), hidden
 
-    def remember(self, arrays: dict[str, np.ndarray], source: str) -> None:
-        """Take over the memory of another one with the same policy.
+    def stored(self, arrays: dict[str, np.ndarray], source: str) -> Hidden:
+        """What the arrays of a checkpoint remember of one robot's episode.
 
         Raises
         ------
         UserError
-            when it has another shape; `source` names it.
+            when it has another shape than this policy's; `source` names the checkpoint.
         """
         hidden = tuple(arrays[name] for name in sorted(arrays)) or None
         shape = getattr(self._model.policy, "lstm_hidden_state_shape", None)
         if hidden and any(part.shape != tuple(shape or ()) for part in hidden):
             raise UserError(f"{source}: its memory does not fit the policy in {self.file}")
-        self.hidden = hidden
+        return hidden
 
 
 def short(space: Any) -> str:
@@ -93,28 +95,28 @@ def wrapped(space: Any, arena: Arena) -> str:
 class PolicyAgent(SeatedAgent):
     """Turns readings into the commands of a frozen policy."""
 
-    def __init__(self, policy: Policy, arena: Arena, max_episode_steps: int):
+    def __init__(self, policy: Policy, max_episode_steps: int):
         percept = "continuous" if policy.percept == "sensors" else policy.percept
         task = convert(TaskOptions, {"percept": percept, "max_episode_steps": max_episode_steps})
         super().__init__(f"policy-{policy.file.stem}", task)
-        self.enter(arena)
         self.policy, self._reward = policy, rewards("own", policy.percept)
+        self.hidden: Hidden = None
 
     def decide(self, readings: Readings, over: bool) -> tuple[Step, tuple[float, float]]:
-        """Drive as the policy says, which forgets when an episode begins."""
-        episode, policy = self.episode, self.policy
-        begins = episode.steps == 0
-        if begins:
-            policy.hidden = None
-        reward = self._reward(episode)
+        """Drive as the policy says."""
+        reward = self._reward(self.episode)
         if over:
             return Step(0, -1, reward, 0.0, 0.0), (0.0, 0.0)
-        ((left, right),) = policy.motors(readings, episode.history, np.array([begins])).tolist()
+        motors, self.hidden = self.policy.motors(self.episode, self.hidden)
+        ((left, right),) = motors.tolist()
         return Step(0, action_of(left, right), reward, 0.0, 0.0), (left, right)
+
+    def another(self) -> Self:
+        return type(self)(self.policy, self.task.max_episode_steps)
 
     def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
         """Where it is in its episode, for a successor with the same policy; the policy itself is in its file."""
-        arrays = {f"hidden_{at}": part for at, part in enumerate(self.policy.hidden or ())}
+        arrays = {f"hidden_{at}": part for at, part in enumerate(self.hidden or ())}
         meta = self._meta(
             arrays, hyperparameters={}, exploration={}, budget=0, epoch=0, state=(), linked=False, random={}, visits=[]
         )
@@ -122,26 +124,21 @@ class PolicyAgent(SeatedAgent):
 
     def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
         """Continue where another one with the same policy is; UserError when its memory does not fit."""
-        self.policy.remember(arrays, source)
+        self.hidden = self.policy.stored(arrays, source)
         super().restore(meta, arrays, source)
 
 
 class PolicyCrowd:
-    """Drives N robots through one episode each, all of which begin at the same tick."""
+    """Drives N robots through an evaluation."""
 
     def __init__(self, policy: Policy):
         self._policy = policy
-        self._history: LightHistory | None = None
+        self._hidden: Hidden = None
 
-    def __call__(self, observation: BatchObservation) -> np.ndarray:
+    def __call__(self, episode: Episode) -> np.ndarray:
         """The motor commands (N, 2) of one tick."""
-        count, begins = len(observation.front), self._history is None
-        if self._history is None:
-            self._history = LightHistory(count)
-            self._history.begin(observation.light)
-        else:
-            self._history.step(observation.light)
-        return self._policy.motors(observation, self._history, np.full(count, begins))
+        motors, self._hidden = self._policy.motors(episode, self._hidden)
+        return motors
 
 
 class PolicyFile:
@@ -163,7 +160,9 @@ class PolicyFile:
         self._normalize = None if normalize is None else normalizer(normalize, trusted, self._model)
 
     def __call__(self, world: World, max_episode_steps: int) -> PolicyAgent:
-        return PolicyAgent(self._policy(world.arena), world.arena, max_episode_steps)
+        agent = PolicyAgent(self._policy(world.arena), max_episode_steps)
+        agent.enter(world.arena)
+        return agent
 
     def crowd(self, arena: Arena) -> PolicyCrowd:
         """What drives many robots in an evaluation."""

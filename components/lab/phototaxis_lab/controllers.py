@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from phototaxis.task import FRONT, LEFT, MOTORS, RIGHT, BatchObservation
+from phototaxis.task import FRONT, LEFT, MOTORS, RIGHT, Episode
 
 GAIN = 12.0
 """How strongly the Braitenberg controller turns for a contrast between its two sensors."""
@@ -16,8 +16,8 @@ class Random:
         self._motors = MOTORS[list(actions)]
         self._rng = np.random.default_rng(seed)
 
-    def __call__(self, observation: BatchObservation) -> np.ndarray:
-        return self._rng.choice(self._motors, len(observation.front))
+    def __call__(self, episode: Episode) -> np.ndarray:
+        return self._rng.choice(self._motors, len(episode.now.front))
 
 
 class Braitenberg:
@@ -30,7 +30,8 @@ class Braitenberg:
     def __init__(self, near: float):
         self._near = near
 
-    def __call__(self, observation: BatchObservation) -> np.ndarray:
+    def __call__(self, episode: Episode) -> np.ndarray:
+        observation = episode.now
         left, right = observation.light
         turn = GAIN * (left - right) / np.maximum(left + right, 1e-9)
         turn = np.where(left + right == 0, 2.0, turn)  # dark: spin

@@ -79,8 +79,8 @@ def evaluate(
     return measure(arena, crowd, placements, seed, max_episode_steps, sensors, stepped)
 
 
-Drive = Callable[[BatchObservation], np.ndarray]
-"""From what N robots observe to their motor commands, (N, 2)."""
+Drive = Callable[[Episode], np.ndarray]
+"""From the episodes of N robots, after their newest observation, to motor commands (N, 2)."""
 
 
 def measure(
@@ -106,7 +106,7 @@ def measure(
     episode.begin(observe(0))
     reached, steps, tick = episode.terminated, episode.steps, 0
     while not (reached | episode.truncated).all():
-        crowd.drive(*np.where(reached, 0.0, drive(episode.now).T))
+        crowd.drive(*np.where(reached, 0.0, drive(episode).T))
         stepped()
         tick += 1
         episode.step(observe(tick))
