@@ -74,8 +74,8 @@ def _sensors(folder: Path) -> dict[str, FmuOptions]:
 def _success(arena: Arena, learner: str, options: FmuOptions, seed: int) -> float:
     with choose(options) as sensors:
         loop, _ = train(make_setup(learner), arena, seed, EPOCHS, sensors)
-        loop.agent.learning = False
-        return evaluate(arena, loop.agent, 200, seed, sensors=sensors).success_rate
+        loop.agent.policy.learning = False
+        return evaluate(arena, loop.agent.policy, 200, seed, sensors=sensors).success_rate
 
 
 def report(arena: Arena) -> None:

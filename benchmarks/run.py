@@ -115,13 +115,15 @@ def learners(arena: Arena) -> list[tuple[str, float, float]]:
 
 def crowds(arena: Arena) -> list[tuple[int, float]]:
     """Robot steps/s of evaluations with different numbers of robots."""
-    agent = SETUP.agent(World(run="bench", arena=arena, seed=1, epochs=0), learning=False)
+    policy = SETUP.agent(World(run="bench", arena=arena, seed=1, epochs=0), learning=False).policy
     rows = []
     for count in (1, 16, 256, 4096):
         rates = []
         for number in range(ROUNDS):
             began = time.perf_counter()
-            found = measure(arena, CrowdAgent(agent, arena.sensing.near, count, number), count, number, cap=30)
+            found = measure(
+                arena, CrowdAgent(policy, arena.sensing.near, count, number), count, number, max_episode_steps=30
+            )
             rates.append(30 * found.placements / (time.perf_counter() - began))
         rows.append((count, statistics.median(rates)))
     return rows

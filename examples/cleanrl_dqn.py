@@ -54,7 +54,7 @@ def network(inputs: int, actions: int) -> nn.Module:
 
 def success(net: nn.Module, placements: int = 200, seed: int = 1_000_000) -> float:
     """Share of fresh placements from which the light is reached within 300 steps."""
-    robots = gymnasium.make_vec(NAME, num_envs=placements, percept="continuous", cap=300)
+    robots = gymnasium.make_vec(NAME, num_envs=placements, percept="continuous", max_episode_steps=300)
     seen, _ = robots.reset(seed=seed)
     reached, over = np.zeros(placements, bool), np.zeros(placements, bool)
     while not over.all():
@@ -70,7 +70,7 @@ def train(options: Options) -> nn.Module:
     rng = np.random.default_rng(options.seed)
     where = {"connect": options.connect, "world": options.world} if options.connect else {}
     try:
-        robots = gymnasium.make_vec(NAME, num_envs=options.robots, percept="continuous", cap=100, **where)
+        robots = gymnasium.make_vec(NAME, num_envs=options.robots, percept="continuous", max_episode_steps=100, **where)
     except gymnasium.error.Error as error:
         raise SystemExit(str(error)) from None
     inputs, actions = robots.single_observation_space.shape[0], robots.single_action_space.n

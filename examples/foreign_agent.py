@@ -45,6 +45,6 @@ with session:
             left, right = readings["light"]
             ahead = min(readings["sonar"][3:5]) > 0.5
             motors = ((0, 1) if left > right else (1, 0)) if ahead else (-1, 1)
-            end = "reached" if max(left, right) > 0.95 else ""
+            end = "terminated" if max(left, right) > 0.95 else ""
             answer = {"run": run, "tick": newest, "author": me, "end": end}
             publisher.put(msgpack.packb(answer | {"left": motors[0], "right": motors[1]}))

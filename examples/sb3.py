@@ -33,7 +33,7 @@ HYPERPARAMETERS = {
 
 def success(model: BaseAlgorithm, placements: int = 200, seed: int = 1_000_000) -> float:
     """Share of the placements from which the light is reached within 300 steps."""
-    robots = gymnasium.make_vec(NAME, num_envs=placements, percept="continuous", cap=300)
+    robots = gymnasium.make_vec(NAME, num_envs=placements, percept="continuous", max_episode_steps=300)
     seen, _ = robots.reset(seed=seed)
     reached, over = np.zeros(placements, bool), np.zeros(placements, bool)
     while not over.all():
@@ -55,7 +55,7 @@ def main() -> None:
     options = parser.parse_args()
     where = {"connect": options.connect, "world": options.world} if options.connect else {}
     try:
-        environment = gymnasium.make(NAME, percept="continuous", cap=100, **where)
+        environment = gymnasium.make(NAME, percept="continuous", max_episode_steps=100, **where)
     except gymnasium.error.Error as error:
         raise SystemExit(str(error)) from None
     algorithm = {"dqn": DQN, "ppo": PPO}[options.learner]

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta, Struct
-from phototaxis.task import ACTIONS, Percept, State
+from phototaxis.task import ACTIONS, Percept, PerceptState
 from phototaxis_agent.learner import Learner, Transition, discrete, falling, stored
 
 
@@ -29,7 +29,7 @@ class DoubleQ(Learner):
         self._allowed = list(discrete(percept).actions)
         self._tables = np.zeros((2, *percept.sizes, len(ACTIONS)))
 
-    def values(self, state: State) -> list[float]:
+    def values(self, state: PerceptState) -> list[float]:
         return self._tables[(slice(None), *map(int, state))].mean(axis=0)[self._allowed].tolist()
 
     def learn(self, transition: Transition) -> float:

@@ -42,8 +42,10 @@ def system(start, world):
 @pytest.mark.parametrize("robots", [5, 300])
 def test_the_vector_environment_is_the_same_here_and_there(system, world, robots):
     system(robots)
-    here = gymnasium.make_vec(NAME, num_envs=robots, percept="sensors", cap=30)
-    there: Any = gymnasium.make_vec(NAME, num_envs=robots, percept="sensors", cap=30, connect="local", world=world)
+    here = gymnasium.make_vec(NAME, num_envs=robots, percept="sensors", max_episode_steps=30)
+    there: Any = gymnasium.make_vec(
+        NAME, num_envs=robots, percept="sensors", max_episode_steps=30, connect="local", world=world
+    )
     rng, ends = np.random.default_rng(0), 0
     for seed in (3, 4):
         np.testing.assert_array_equal(here.reset(seed=seed)[0], there.reset(seed=seed)[0])
@@ -67,7 +69,7 @@ def test_resets_of_some_robots_behind_the_bus(system, world, tmp_path):
     paper = (Path(arenas.__file__).parent / "arenas/paper.toml").read_text()
     (tmp_path / "quiet.toml").write_text(paper.replace("noise = 0.05", "noise = 0.0"))
     system(4, "--arena", tmp_path / "quiet.toml")
-    options = {"num_envs": 4, "percept": "sensors", "cap": 20, "autoreset_mode": "SameStep"}
+    options = {"num_envs": 4, "percept": "sensors", "max_episode_steps": 20, "autoreset_mode": "SameStep"}
     here = gymnasium.make_vec(NAME, arena=str(tmp_path / "quiet.toml"), **options)
     there: Any = gymnasium.make_vec(NAME, connect="local", world=world, **options)
     mask = {"reset_mask": np.array([False, True, False, True])}

@@ -218,7 +218,7 @@ def test_a_killed_simulation_gives_the_seat_back_to_its_driver(start, world, tmp
 @pytest.mark.parametrize(
     ("speed", "end", "then"),
     [
-        (0, "asked", lambda readings: readings.episode == 1),
+        (0, "reset", lambda readings: readings.episode == 1),
         (20, "", lambda readings: readings.tick > 0 and not readings.author),
     ],
     ids=["where an episode begins", "where a silent driver's motors are stopped"],

@@ -13,12 +13,14 @@ from phototaxis_agent.agent import Agent
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.following import Following
 from phototaxis_agent.keeping import Keeping
+from phototaxis_agent.policy import Policy
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim.simulation import Simulation
 from phototaxis_sim.stepper import Stepper
 from phototaxis_sim.steps import Steps
 
 LENGTH = struct.Struct("<II")
+DARK = [(0.0, 0.0)] * 5
 
 
 class Mutation(NamedTuple):
@@ -120,10 +122,10 @@ MUTATIONS = [
     Mutation("keeps no journal of the readings", Keeping, "entry", lambda _: lambda self, readings: []),
     Mutation("does not go through the journal again", Keeping, "_again", lambda _: lambda self, *given: iter(())),
     Mutation("learns from a repeated tick again", Once, "__call__", _again),
-    Mutation("loses the percept's history with a checkpoint", Agent, "restore", _restored_without(lights=[])),
+    Mutation("loses the percept's history with a checkpoint", Agent, "restore", _restored_without(lights=DARK)),
     Mutation("loses the step count of the episode", Agent, "restore", _restored_without(steps=0)),
-    Mutation("loses the last state with a checkpoint", Agent, "restore", _restored_without(state=())),
-    Mutation("loses the random state with a checkpoint", Agent, "restore", _other_random),
+    Mutation("loses the last state with a checkpoint", Agent, "restore", _restored_without(state=(0, 0, 0, 0))),
+    Mutation("loses the random state with a checkpoint", Policy, "restore", _other_random),
     Mutation("takes a torn frame for a whole one", Journal, "read", _torn_is_whole),
     Mutation("inherits nothing", Following, "_inherit", lambda _: lambda self, reply, source: "nothing"),
     Mutation("applies the command of another tick", Steps, "command", _taken_for(tick=lambda self: self.tick)),

@@ -11,7 +11,6 @@ from phototaxis.checkpoint import load, save
 from phototaxis.errors import UserError
 from phototaxis.messages import World
 from phototaxis.task import PERCEPTS
-from phototaxis_agent.agent import Agent
 from phototaxis_agent.exploration import Exploration, draw
 from phototaxis_agent.learner import Transition, find
 from phototaxis_agent.learners.qtable import Hyperparameters, QTable
@@ -67,15 +66,15 @@ def test_the_agent_learns_from_the_action_that_was_applied(setup: Setup, paper: 
     agent(readings(3, left=0.0, right=0.0, author=""))  # the motors were stopped
     agent(readings(4, episode=1, left=1.0, right=1.0, author="someone"))  # a new episode
     assert np.array_equal(agent.learner.save()["table"], after)
-    assert agent.epoch == 1
+    assert agent.policy.epoch == 1
 
 
-def test_episodes_end_at_the_light_and_at_the_cap(paper: Arena):
-    setup = make_setup(cap=3)
+def test_episodes_end_at_the_light_and_after_their_last_step(paper: Arena):
+    setup = make_setup(max_episode_steps=3)
     agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=0))
     ends = [agent(readings(tick, left=1.0, right=1.0, author="a")).end for tick in range(5)]
-    assert ends == ["", "", "", "cap", "cap"]
-    assert agent(readings(9, episode=1, light=(0.2, 0.96))).end == "reached"
+    assert ends == ["", "", "", "truncated", "truncated"]
+    assert agent(readings(9, episode=1, light=(0.2, 0.96))).end == "terminated"
 
 
 def test_a_checkpoint_continues_bit_for_bit(tmp_path: Path, setup: Setup, paper: Arena):
@@ -145,9 +144,9 @@ def test_an_unknown_learner_lists_those_there_are():
 
 
 def test_a_frozen_agent_does_not_learn(setup: Setup, paper: Arena):
-    agent: Agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=0), learning=False)
+    agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=0), learning=False)
     before = agent.checkpoint()[0].learner_hash
     for tick in range(20):
         agent(readings(tick, left=1.0, right=1.0, author="a"))
     assert agent.checkpoint()[0].learner_hash == before
-    assert math.isclose(agent.last.temperature, agent.exploration.cold)
+    assert math.isclose(agent.last.temperature, agent.policy.exploration.cold)

@@ -190,13 +190,13 @@ def test_a_world_in_which_no_episode_could_be_is_refused(enter, text, words):
 def test_episodes_that_end_before_they_begin_do_not_go_on_for_ever(paper):
     simulation = Simulation(paper, 0, "r")
     for _ in range(999):
-        simulation.advance(0.0, 0.0, "a", "reached")
+        simulation.advance(0.0, 0.0, "a", "terminated")
     with pytest.raises(UserError, match=r"1000 episodes.*placement.light_distance"):
-        simulation.advance(0.0, 0.0, "a", "reached")
+        simulation.advance(0.0, 0.0, "a", "terminated")
     again = Simulation(paper, 0, "r")
     for _ in range(1001):
         again.advance(0.0, 0.0, "a")
-        again.advance(0.0, 0.0, "a", "reached")
+        again.advance(0.0, 0.0, "a", "terminated")
 
 
 def test_a_digest_is_of_the_world_and_not_of_its_name(paper):

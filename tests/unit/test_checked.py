@@ -18,13 +18,14 @@ from phototaxis.checkpoint import encode
 from phototaxis.codec import encode as on_the_wire
 from phototaxis.errors import ComponentFailed, UserError
 from phototaxis.messages import AgentLog
-from phototaxis.task import CrowdReadings, TaskOptions
-from phototaxis_agent import agent as module
+from phototaxis.task import BatchObservation, Episode, TaskOptions
+from phototaxis_agent import policy as module
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.crowd import CrowdAgent
 from phototaxis_agent.exploration import Exploration
 from phototaxis_agent.learner import Learner, discrete
 from phototaxis_agent.learners.qtable import QTable
+from phototaxis_agent.policy import Policy
 from phototaxis_agent.setup import make_setup
 from phototaxis_agent.stuck import watched
 from phototaxis_lab.loop import Loop
@@ -66,9 +67,8 @@ def make(monkeypatch: pytest.MonkeyPatch):
     def agent(percept: Any = "simple", learning: bool = True, **methods: Any) -> Agent:
         kind = type("Theirs", (Table,), methods)
         monkeypatch.setattr(module, "find", lambda _: kind)
-        return Agent(
-            "theirs", None, TaskOptions(percept=percept), Exploration(), near=0.4, seed=1, budget=100, learning=learning
-        )
+        task = TaskOptions(percept=percept)
+        return Agent(Policy("theirs", None, task, Exploration(), near=0.4, seed=1, budget=100, learning=learning))
 
     return agent
 
@@ -291,7 +291,7 @@ def test_values_of_many_are_checked_as_those_of_one(make, paper: Arena):
     ):
         agent = make(learning=False, **methods)
         with pytest.raises(ComponentFailed, match=r"^learner theirs: .*step [01] of an evaluation") as failed:
-            evaluate(paper, agent, 7, 0, cap=3)
+            evaluate(paper, agent.policy, 7, 0, max_episode_steps=3)
         assert expected in str(failed.value)
 
 
@@ -301,11 +301,12 @@ def test_a_learner_cannot_change_the_states_of_a_crowd(make, paper: Arena):
         return np.zeros((len(states), 9))
 
     agent = make(learning=False, values_of=careless)
-    crowd = CrowdAgent(agent, 0.4, 3, 0)
-    evaluate(paper, agent, 3, 0, cap=2)
+    crowd = CrowdAgent(agent.policy, 0.4, 3, 0)
+    evaluate(paper, agent.policy, 3, 0, max_episode_steps=2)
     dark, free = np.zeros(3), np.zeros(3, bool)
-    crowd(CrowdReadings(np.full((16, 3), 5.0), np.stack([dark, dark]), free, free))
-    assert crowd._state is not None
+    episode = Episode(100, 3)
+    episode.begin(BatchObservation(np.full((16, 3), 5.0), np.stack([dark, dark]), free, free))
+    crowd(episode)
     assert not (crowd._state == 5.0).any()
 
 

@@ -8,11 +8,11 @@ import pytest
 from making import readings
 from phototaxis.arena import Arena
 from phototaxis.messages import World
-from phototaxis.task import ACTIONS, PERCEPTS, Memory
-from phototaxis_agent.crowd import CrowdReadings, columns, draw_many
+from phototaxis.task import MOTORS, PERCEPTS, BatchObservation, Episode, LightHistory
+from phototaxis_agent.crowd import columns, draw_many
 from phototaxis_agent.exploration import draw
 from phototaxis_agent.setup import make_setup
-from phototaxis_lab.measure import direct_steps, evaluate
+from phototaxis_lab.measure import direct_steps, evaluate, measure
 from phototaxis_sensors.crowd import CrowdSuite
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim import arenas
@@ -42,7 +42,7 @@ def test_a_crowd_moves_as_each_robot_would_alone(name):
                 pose = alone[row].random_pose(rng)
                 crowd.place(row, pose)
                 alone[row].place(pose)
-        motors = np.array(ACTIONS)[rng.integers(9, size=COUNT)] if tick % 20 > 10 else np.ones((COUNT, 2))
+        motors = MOTORS[rng.integers(9, size=COUNT)] if tick % 20 > 10 else np.ones((COUNT, 2))
         crowd.drive(*motors.T)
         motions = [physics.drive(*command) for physics, command in zip(alone, motors.tolist(), strict=True)]
         difference = crowd.poses - np.array([motion.pose for motion in motions])
@@ -76,26 +76,26 @@ def test_a_crowd_senses_as_each_robot_would_alone(name, noise):
 @pytest.mark.parametrize("name", PERCEPTS)
 def test_percepts_of_arrays_are_those_of_numbers(name):
     rng, percept = np.random.default_rng(2), PERCEPTS[name]
-    memories, together = [Memory() for _ in range(COUNT)], Memory()
+    histories, together = [LightHistory() for _ in range(COUNT)], LightHistory(COUNT)
     seen = set()
     for tick in range(30):
         light = rng.uniform(0, 1, (2, COUNT)) if tick % 10 < 3 else np.full((2, COUNT), 0.3)
         sonar, bumps = rng.uniform(0, 2, (16, COUNT)), rng.random((2, COUNT)) < 0.3
-        senses = CrowdReadings(sonar, light, *bumps)
-        together.see(senses)
-        states = columns(percept.state(senses, together, 0.4), COUNT)
-        for robot, memory in enumerate(memories):
+        observation = BatchObservation(sonar, light, *bumps)
+        (together.step if tick else together.begin)(light)
+        states = columns(percept.state(observation, together, 0.4), COUNT)
+        for robot, history in enumerate(histories):
             left, right = light[:, robot].tolist()
             front, rear = bumps[:, robot].tolist()
             one = readings(tick, (left, right), sonar=sonar[:, robot].tolist(), front=front, rear=rear)
-            memory.see(one)
-            state = percept.state(one, memory, 0.4)
+            (history.step if tick else history.begin)(one.light)
+            state = percept.state(one, history, 0.4)
             assert states[robot].tolist() == pytest.approx(list(state))
             assert len(state) == len(percept.sizes) == len(percept.variables)
             seen.add(state)
     assert len(seen) > 20 or name == "simple"
     if all(percept.sizes):
-        assert {1 * memory.unchanged for memory in memories} == {1}
+        assert {1 * history.unchanged for history in histories} == {1}
 
 
 def test_draws_of_many_are_draws_of_one():
@@ -106,17 +106,17 @@ def test_draws_of_many_are_draws_of_one():
 
 
 def test_an_evaluation_follows_from_its_seed(paper: Arena):
-    agent = make_setup().agent(World(run="r", arena=paper, seed=0, epochs=10), learning=False)
+    policy = make_setup().agent(World(run="r", arena=paper, seed=0, epochs=10), learning=False).policy
     steps: list[None] = []
-    first = evaluate(paper, agent, 20, seed=3, cap=30, stepped=lambda: steps.append(None))
+    first = evaluate(paper, policy, 20, seed=3, max_episode_steps=30, stepped=lambda: steps.append(None))
     assert 0 < len(steps) <= 30
-    assert first == evaluate(paper, agent, 20, seed=3, cap=30)
-    assert first != evaluate(paper, agent, 20, seed=4, cap=30)
+    assert first == evaluate(paper, policy, 20, seed=3, max_episode_steps=30)
+    assert first != evaluate(paper, policy, 20, seed=4, max_episode_steps=30)
 
 
 def test_an_agent_that_learns_is_not_evaluated(paper: Arena):
     with pytest.raises(ValueError, match="must not learn"):
-        evaluate(paper, make_setup().agent(World(run="r", arena=paper, seed=0, epochs=10)), 5, seed=0)
+        evaluate(paper, make_setup().agent(World(run="r", arena=paper, seed=0, epochs=10)).policy, 5, seed=0)
 
 
 def test_the_direct_way_is_turning_and_driving(paper: Arena):
@@ -127,16 +127,14 @@ def test_the_direct_way_is_turning_and_driving(paper: Arena):
     assert direct_steps(paper, Pose(4, 5, 0)) == 1
 
 
-def scripted(motors: tuple[float, float]) -> Callable[[CrowdReadings], np.ndarray]:
-    return lambda readings: np.tile(motors, (len(readings.front), 1))
+def scripted(motors: tuple[float, float]) -> Callable[[Episode], np.ndarray]:
+    return lambda episode: np.tile(motors, (len(episode.now.front), 1))
 
 
 def test_success_is_counted_where_the_light_is_reached(paper: Arena):
-    from phototaxis_lab.measure import measure
-
-    still = measure(paper, scripted((0, 0)), 30, seed=1, cap=20)
+    still = measure(paper, scripted((0, 0)), 30, seed=1, max_episode_steps=20)
     assert (still.success_rate, still.steps_mean, still.path_ratio) == (0, None, None)
-    ahead = measure(paper, scripted((1, 1)), 200, seed=1, cap=40)
+    ahead = measure(paper, scripted((1, 1)), 200, seed=1, max_episode_steps=40)
     assert 0.05 < ahead.success_rate < 0.5
     assert ahead.path_ratio is not None
     assert 0.9 < ahead.path_ratio < 1.3

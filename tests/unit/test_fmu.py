@@ -240,6 +240,6 @@ def test_a_suite_with_an_fmu_repeats_itself(fmu: Built, paper: Arena, sensors):
         readings = []
         for step in range(120):
             readings.append(suite(simulation.state))
-            simulation.advance(1.0, 0.3, "a", "cap" if step % 40 == 39 else "")
+            simulation.advance(1.0, 0.3, "a", "truncated" if step % 40 == 39 else "")
         runs.append(readings)
     assert runs[0] == runs[1]

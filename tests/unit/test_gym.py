@@ -12,7 +12,7 @@ import pytest
 from gymnasium.error import Error, InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from phototaxis.messages import World
-from phototaxis.task import ACTIONS, REWARDS, CrowdReadings
+from phototaxis.task import ACTIONS, REWARDS
 from phototaxis_agent.setup import make_setup
 from phototaxis_gym.single import LightSeeker
 from phototaxis_lab.loop import Loop
@@ -49,7 +49,7 @@ def test_it_does_what_an_agent_in_one_process_meets():
     arena, episodes, reward = arenas.load("paper"), 0, 0.0
     agent = make_setup("qtable").agent(World(run="x", arena=arena, seed=5, epochs=0))
     loop = Loop(arena, agent, 5)
-    environment = gymnasium.make(NAME, cap=100)
+    environment = gymnasium.make(NAME, max_episode_steps=100)
     seen, _ = environment.reset(seed=5)
     for _ in range(600):
         ended = loop.step()
@@ -81,8 +81,8 @@ def test_seeds_are_honoured():
     assert not np.array_equal(walk(first, 3), walk(second, 4))
 
 
-def test_terminated_is_the_light_and_truncated_the_cap():
-    environment = gymnasium.make(NAME, percept="sensors", cap=50)
+def test_terminated_is_the_light_and_truncated_the_last_step():
+    environment = gymnasium.make(NAME, percept="sensors", max_episode_steps=50)
     ends = {"terminated": 0, "truncated": 0}
     environment.reset(seed=0)
     steps, rng = 0, np.random.default_rng(0)
@@ -103,7 +103,7 @@ def test_terminated_is_the_light_and_truncated_the_cap():
 
 @pytest.mark.parametrize("percept", PERCEPTS)
 def test_many_robots_do_what_each_would_do_alone(percept, quiet):
-    options = {"percept": percept, "arena": quiet, "cap": 60}
+    options = {"percept": percept, "arena": quiet, "max_episode_steps": 60}
     count = 5
     many = gymnasium.make_vec(NAME, num_envs=count, **options)
     singles = [gymnasium.make(NAME, **options) for _ in range(count)]
@@ -127,17 +127,6 @@ def test_many_robots_do_what_each_would_do_alone(percept, quiet):
     assert ends > 10
 
 
-@pytest.mark.parametrize("scheme", REWARDS)
-def test_the_rewards_of_many_are_those_of_each(scheme):
-    rng, reward = np.random.default_rng(0), REWARDS[scheme]
-    light, before = rng.random((2, 200)) ** 3, rng.random(200)
-    front, rear, unchanged = (rng.random(200) < 0.1 for _ in range(3))
-    found = reward.many(before, CrowdReadings(np.zeros((16, 200)), light, front, rear), unchanged)
-    for row in range(200):
-        now = CrowdReadings(np.zeros(16), tuple(light[:, row]), front[row], rear[row])  # type: ignore[arg-type]
-        assert found[row] == pytest.approx(reward(before[row], now, unchanged[row]))
-
-
 def test_continuous_wheels_and_the_nine_actions_agree(quiet):
     nine = gymnasium.make(NAME, percept="sensors", arena=quiet)
     wheels = gymnasium.make(NAME, percept="sensors", arena=quiet, action="continuous")
@@ -155,8 +144,6 @@ def test_continuous_wheels_and_the_nine_actions_agree(quiet):
         ({"arena": "mars"}, "no arena 'mars'"),
         ({"reward": "praise"}, "no reward 'praise'; there are: own, difference"),
         ({"action": "jump"}, "no actions 'jump'; there are: discrete, continuous"),
-        ({"cap": 0}, "cap 0: an episode has at least one step"),
-        ({"cap": 2.5}, r"cap 2.5: a whole number of steps is needed"),
         ({"connect": "local", "world": "a/*"}, r"world 'a/\*': up to 40 letters"),
         ({"connect": "127.0.0.1:7447"}, "an endpoint is like tcp/127.0.0.1:7447"),
     ],

@@ -325,18 +325,17 @@ def test_a_copy_goes_on_as_the_original_does_to_the_last_bit(steps, by):
 def test_more_steps_than_usual_are_given_as_gymnasium_has_it():
     one = gymnasium.make(OURS, max_episode_steps=400)
     many = gymnasium.make_vec(OURS, num_envs=2, max_episode_steps=400)
-    capped = gymnasium.make_vec(OURS, num_envs=2, cap=400)
     endless = gymnasium.make_vec(OURS, num_envs=2, max_episode_steps=-1)
-    for environment, action in ((one, 0), (many, [0, 0]), (capped, [0, 0]), (endless, [0, 0])):
+    for environment, action in ((one, 0), (many, [0, 0]), (endless, [0, 0])):
         environment.reset(seed=1)
         cut = [np.all(environment.step(action)[3]) for _ in range(400)]
         assert not any(cut[:-1])
         assert cut[-1] == (environment is not endless)
     assert gymnasium.spec("phototaxis/LightSeeker-v0").max_episode_steps == 300
-    with pytest.warns(UserWarning, match="give it max_episode_steps=400, too"):
-        gymnasium.make(OURS, cap=400)
-    with pytest.raises(gymnasium.error.Error, match="max_episode_steps 0"):
+    with pytest.raises(gymnasium.error.Error, match="max_episode_steps 0: an episode has at least one step"):
         gymnasium.make_vec(OURS, num_envs=2, max_episode_steps=0)
+    with pytest.raises(TypeError, match=r"max_episode_steps 2\.5: a whole number of steps is needed"):
+        gymnasium.make_vec(OURS, num_envs=2, max_episode_steps=2.5)
 
 
 def test_success_is_told_at_the_light_and_at_the_cap():

@@ -32,7 +32,7 @@ def test_these_are_the_names():
 
 @pytest.mark.parametrize(("name", "percept"), EVERY)
 def test_a_checkpoint_continues_bit_for_bit(tmp_path, paper: Arena, name, percept):
-    setup, epochs, half = make_setup(name, percept=percept, cap=40), 360, 200
+    setup, epochs, half = make_setup(name, percept=percept, max_episode_steps=40), 360, 200
     whole = Loop(paper, setup.agent(World(run="r", arena=paper, seed=3, epochs=epochs)), 3, epochs)
     other = Loop(paper, setup.agent(World(run="r", arena=paper, seed=3, epochs=epochs)), 3, epochs)
     for tick in range(epochs):

@@ -114,7 +114,7 @@ def test_a_snapshot_continues_bit_for_bit(paper: Arena):
     simulation, commands = Simulation(paper, 4, "r"), [(1.0, 0.0), (1.0, 1.0), (-1.0, 1.0)] * 20
     for command in commands:
         simulation.advance(*command, author="x")
-    simulation.advance(0, 0, "x", "cap")
+    simulation.advance(0, 0, "x", "truncated")
     snapshot = simulation.snapshot([], "")
     expected = [simulation.advance(*command, author="x").hash for command in commands]
     fresh = Simulation(paper, 4, "r")

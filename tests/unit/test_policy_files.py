@@ -10,13 +10,18 @@ import pytest
 import torch
 from phototaxis.arena import Arena
 from phototaxis.checkpoint import decode, encode
+from phototaxis.columns import FLAG, pack, unpack
 from phototaxis.errors import UserError
-from phototaxis.messages import World
-from phototaxis.task import CrowdReadings
+from phototaxis.messages import ENDS, Readings, ReadingsOfMany, World
+from phototaxis.task import BatchObservation, Episode
+from phototaxis.task.episode import RESET
+from phototaxis_agent.many import Flock
 from phototaxis_gym.place import Here
 from phototaxis_gym.policy import PolicyAgent, PolicyFile
 from phototaxis_gym.sb3 import Robots
 from phototaxis_lab import evaluate
+from phototaxis_sensors.crowd import CrowdSuite
+from phototaxis_sim.many import SimulationOfMany
 from sb3_contrib import ARS, QRDQN, TQC, TRPO, CrossQ, MaskablePPO, RecurrentPPO
 from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3
 from stable_baselines3.common.callbacks import EvalCallback
@@ -25,7 +30,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecFrameStack, VecMonitor, VecNormalize
 
 NAME = "phototaxis_gym:phototaxis/LightSeeker-v0"
-CAP = 12
+MAX_STEPS = 12
 
 
 @pytest.fixture(autouse=True)
@@ -51,7 +56,7 @@ def save(
 
 
 def agent(file: Path, paper: Arena, **more: Any) -> PolicyAgent:
-    return PolicyFile(file, trusted=True, **more)(World(run="x", arena=paper, seed=5, epochs=0), CAP)
+    return PolicyFile(file, trusted=True, **more)(World(run="x", arena=paper, seed=5, epochs=0), MAX_STEPS)
 
 
 def drive(agents: list[PolicyAgent], paper: Arena, ticks: int) -> list[list[tuple[float, float, str]]]:
@@ -68,7 +73,7 @@ def drive(agents: list[PolicyAgent], paper: Arena, ticks: int) -> list[list[tupl
 
 def expected(model: Any, ticks: int, normalize: Any = lambda seen: seen, **options: Any) -> list[tuple]:
     """The commands that `predict` chooses as its documentation has it, for the same placements."""
-    environment: Any = gymnasium.make(NAME, cap=CAP, **options)
+    environment: Any = gymnasium.make(NAME, max_episode_steps=MAX_STEPS, **options)
     seen, _ = environment.reset(seed=5)
     found, memory, start = list[tuple](), None, True
     while len(found) < ticks:
@@ -77,10 +82,10 @@ def expected(model: Any, ticks: int, normalize: Any = lambda seen: seen, **optio
         )
         seen, _, terminated, truncated, _ = environment.step(action)
         start = terminated or truncated
-        readings = environment.unwrapped._readings
+        readings = environment.unwrapped._episode.now
         found.append((readings.left, readings.right, ""))
         if start:
-            found.append((0.0, 0.0, "reached" if terminated else "cap"))
+            found.append((0.0, 0.0, "terminated" if terminated else "truncated"))
             seen, _ = environment.reset()
     return found[:ticks]
 
@@ -130,16 +135,46 @@ def test_many_robots_are_driven_as_one(paper, tmp_path):
     """In an evaluation: each robot has a memory of its own."""
     file = save(RecurrentPPO, tmp_path, "MlpLstmPolicy")
     crowd, alone = PolicyFile(file, trusted=True).crowd(paper), agent(file, paper)
-    place = Here(paper)
+    place, episode = Here(paper), Episode(MAX_STEPS, 2)
     readings = place.begin(5)
-    for _ in range(8):
-        rows = CrowdReadings(
+    for step in range(8):
+        rows = BatchObservation(
             np.array([readings.sonar, [8.0] * 16]).T, np.array([readings.light, (0.1, 0.2)]).T,
             np.array([readings.front, False]), np.array([readings.rear, True]),
         )  # fmt: skip
         command = alone(readings)
-        np.testing.assert_allclose(crowd(rows)[0], (command.left, command.right), atol=1e-6)
+        (episode.step if step else episode.begin)(rows)
+        np.testing.assert_allclose(crowd(episode)[0], (command.left, command.right), atol=1e-6)
         readings = place.drive(command.left, command.right)
+
+
+def test_a_policy_drives_the_robots_of_a_world_each_in_its_own_episode(paper, tmp_path):
+    file = save(RecurrentPPO, tmp_path, "MlpLstmPolicy")
+    simulation = SimulationOfMany(paper, 5, "x", robots=3)
+    suite, flock = CrowdSuite(simulation.world), Flock(agent(file, paper), 3)
+    alone = [agent(file, paper) for _ in range(3)]
+    for _ in range(2 * MAX_STEPS):
+        state = simulation.state
+        sonar, light = suite(state.tick, simulation.poses)
+        command = flock(
+            ReadingsOfMany(
+                run="x", tick=state.tick, epoch=state.epoch, episode=state.episode, sonar=pack(sonar),
+                light=pack(light), contact=state.contact, left=state.left, right=state.right, author="", driver="",
+            )
+        )  # fmt: skip
+        ends = unpack(command.end, 3, kind=FLAG)
+        for row, one in enumerate(alone):
+            answer = one(
+                Readings(
+                    run="x", tick=state.tick, episode=simulation.episode[row], epoch=state.epoch,
+                    sonar=sonar[:, row].tolist(), light=tuple(light[:, row].tolist()), front=simulation.front[row],
+                    rear=simulation.rear[row], left=0.0, right=0.0, author="", driver="",
+                )
+            )  # fmt: skip
+            motors = unpack(command.left, 3)[row], unpack(command.right, 3)[row]
+            assert (*motors, ENDS[ends[row]]) == (answer.left, answer.right, answer.end)
+        reset = pack(np.array([0, RESET, 0]), FLAG)  # so that the episodes end at different ticks
+        simulation.advance(command.left, command.right, "x", reset if state.tick == 5 else command.end)
 
 
 def normalized(folder: Path, **more: Any) -> tuple[Path, VecNormalize]:
@@ -238,7 +273,7 @@ def test_a_policy_of_a_class_of_ones_own_is_recognised(paper, tmp_path):
 
 def test_evaluate_takes_such_files(tmp_path, capsys):
     file, _ = normalized(tmp_path)
-    words = [str(file), "--placements", "3", "--cap", "5", "--json"]
+    words = [str(file), "--placements", "3", "--max-episode-steps", "5", "--json"]
     for more, line in (
         ([], "add --trust"),
         (["--trust"], "needs its statistics"),
@@ -253,9 +288,9 @@ def test_evaluate_takes_such_files(tmp_path, capsys):
 
 
 def test_stable_baselines_counts_successes(tmp_path):
-    robots = make_vec_env(NAME, n_envs=2, seed=1, env_kwargs={"percept": "continuous", "cap": 30})
+    robots = make_vec_env(NAME, n_envs=2, seed=1, env_kwargs={"percept": "continuous", "max_episode_steps": 30})
     judge = EvalCallback(
-        make_vec_env(NAME, n_envs=2, env_kwargs={"cap": 30, "percept": "continuous"}),
+        make_vec_env(NAME, n_envs=2, env_kwargs={"max_episode_steps": 30, "percept": "continuous"}),
         n_eval_episodes=4,
         eval_freq=64,
         verbose=0,
@@ -270,7 +305,7 @@ def test_stable_baselines_counts_successes(tmp_path):
 
 def test_many_robots_are_a_vecenv_of_stable_baselines(quiet):
     """Step by step as its own loop over single robots, with the last observations of episodes."""
-    options = {"percept": "sensors", "arena": quiet, "cap": 15}
+    options = {"percept": "sensors", "arena": quiet, "max_episode_steps": 15}
     ours, theirs = Robots(3, **options), make_vec_env(NAME, n_envs=3, env_kwargs=options)
     rng, ends = np.random.default_rng(0), 0
     for environment in (ours, theirs):
@@ -290,6 +325,12 @@ def test_many_robots_are_a_vecenv_of_stable_baselines(quiet):
             assert one["is_success"] == other["is_success"]
             assert one["TimeLimit.truncated"] == other["TimeLimit.truncated"]
     assert ends > 8
-    model = PPO("MlpPolicy", VecMonitor(Robots(4, percept="continuous", cap=20)), device="cpu", n_steps=32, n_epochs=1)
+    model = PPO(
+        "MlpPolicy",
+        VecMonitor(Robots(4, percept="continuous", max_episode_steps=20)),
+        device="cpu",
+        n_steps=32,
+        n_epochs=1,
+    )
     model.learn(256)
     assert len(model.ep_success_buffer or ()) > 2

@@ -9,7 +9,7 @@ import pytest
 import rerun as rr
 from disks import no_file_larger_than
 from phototaxis.arena import Arena, Light, Wall
-from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
+from phototaxis.messages import AgentLog, EndedEpisode, SensorsLog, SimLog, World
 from phototaxis.ports import free_ports
 from phototaxis.task import ACTIONS, PERCEPTS
 from phototaxis_recorder import policy
@@ -229,7 +229,7 @@ def test_the_papers_line_stands_beside_the_papers_system_alone(
     translator = Translator(
         recording, World(run="r", arena=msgspec.structs.replace(paper, name=arena), seed=0, epochs=0)
     )
-    ended = Episode(run="r", episode=0, tick=1, steps=1, end="reached", driver="a", x=0.0, y=0.0, heading=0.0)
+    ended = EndedEpisode(run="r", episode=0, tick=1, steps=1, end="terminated", driver="a", x=0.0, y=0.0, heading=0.0)
     none, one = [0, 0], [1.0, 1.0]
     translator.sim(SimLog(
         run="r", seq=0, writer="s", driver="a", tick=[0, 1], episode=none, time=one, x=one, y=one, heading=one,

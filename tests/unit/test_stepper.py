@@ -122,7 +122,7 @@ def test_a_step_is_in_the_journal_before_anybody_hears_of_it_and_recorded_afterw
     assert kinds(desk.command()) == [Append, Publish, Record]
     assert desk.tick == 2
     assert desk.log() == [0, 1]
-    end = desk.command(end="cap")
+    end = desk.command(end="truncated")
     assert kinds(end) == [Begin, Publish, Record, Publish]
     assert published(end, "episode")[0].steps == 2
 
@@ -244,7 +244,7 @@ def test_a_held_command_is_applied_when_lockstep_begins():
 def test_a_continued_simulation_keeps_the_seat_for_who_took_over_as_the_episode_ended():
     desk = seated()
     desk.ask("take over", "b", at=1)
-    (begun,) = (one for one in desk.command(end="cap") if isinstance(one, Begin))
+    (begun,) = (one for one in desk.command(end="truncated") if isinstance(one, Begin))
     found = continued([begun.header], Simulation(PAPER, 3, "r"), Path("journal"))
     assert Desk(found=found).machine.steps.seat.heir == "b"
 
@@ -287,7 +287,7 @@ def test_a_journal_that_cannot_be_written_is_told_until_the_next_episode():
     desk = seated()
     assert kinds(desk.give(Event("unwritten", Unwritten("journal", "j: no space left")))) == [Warn]
     assert "cannot be continued" in desk.status().warnings[0]
-    desk.command(end="cap")
+    desk.command(end="truncated")
     assert desk.status().warnings == []
 
 

@@ -1,11 +1,25 @@
-"""The task is the paper's: percepts, actions, rewards, the memory of unchanged light."""
+"""The task is the paper's: percepts, actions, rewards, the history of unchanged light."""
 
 import math
+from itertools import product
 
+import numpy as np
 import pytest
 from making import readings
 from phototaxis.messages import Readings
-from phototaxis.task import ACTIONS, FORWARD, MOVING, PERCEPTS, Memory, TaskOptions, lit
+from phototaxis.task import (
+    ACTIONS,
+    FORWARD,
+    MOVING,
+    PERCEPTS,
+    REWARDS,
+    Episode,
+    LightHistory,
+    TaskOptions,
+    action_of,
+    at_goal,
+    state_number,
+)
 
 
 def sonar(**near: float) -> list[float]:
@@ -15,17 +29,18 @@ def sonar(**near: float) -> list[float]:
     return ranges
 
 
-def seen(percept: str, senses: Readings, times: int = 1) -> tuple[float, ...]:
-    """The state after as many steps with the same readings."""
-    memory = Memory()
-    for _ in range(times):
-        memory.see(senses)
-    return PERCEPTS[percept].state(senses, memory, 0.4)
+def seen(percept: str, observation: Readings, times: int = 1) -> tuple[float, ...]:
+    """The state after as many equal readings."""
+    history = LightHistory()
+    history.begin(observation.light)
+    for _ in range(times - 1):
+        history.step(observation.light)
+    return PERCEPTS[percept].state(observation, history, 0.4)
 
 
-def unchanged(memory: Memory, light: tuple[float, float]) -> bool:
-    memory.see(readings(light=light))
-    return memory.unchanged
+def unchanged(history: LightHistory, light: tuple[float, float]) -> bool:
+    history.step(light)
+    return history.unchanged
 
 
 def test_state_spaces_have_the_papers_sizes():
@@ -72,17 +87,19 @@ def test_rich_percept(light, ranges, state):
 
 
 def test_unchanged_needs_five_equal_readings_on_both_sides():
-    memory = Memory()
-    assert [unchanged(memory, (0.1, 0.1)) for _ in range(5)] == [False] * 4 + [True]
-    assert unchanged(memory, (0.109, 0.1))
-    assert not unchanged(memory, (0.109, 0.12))
-    memory.clear()
-    assert not unchanged(memory, (0.1, 0.1))
+    history = LightHistory()
+    history.begin((0.1, 0.1))
+    assert not history.unchanged
+    assert [unchanged(history, (0.1, 0.1)) for _ in range(4)] == [False] * 3 + [True]
+    assert unchanged(history, (0.109, 0.1))
+    assert not unchanged(history, (0.109, 0.12))
+    history.begin((0.109, 0.12))
+    assert not history.unchanged
 
 
 def test_light_is_reached_above_095_on_either_side():
-    assert lit(readings(light=(0.1, 0.951)))
-    assert not lit(readings(light=(0.95, 0.95)))
+    assert at_goal(readings(light=(0.1, 0.951)))
+    assert not at_goal(readings(light=(0.95, 0.95)))
 
 
 @pytest.mark.parametrize(
@@ -100,8 +117,31 @@ def test_light_is_reached_above_095_on_either_side():
     ],
 )
 def test_rewards(scheme, before, now, unchanged, reward):
-    found = TaskOptions(reward=scheme).scheme()(before, readings(**now), unchanged)
-    assert found == pytest.approx(reward)
+    episode, earlier = Episode(100), now["light"] if unchanged else (before, 0.0)
+    episode.begin(readings(light=earlier))
+    for light in [earlier] * 3 if unchanged else []:
+        episode.step(readings(light=light))
+    episode.step(readings(**now))
+    assert TaskOptions(reward=scheme).scheme()(episode) == pytest.approx(reward)
+
+
+def test_the_first_observation_of_an_episode_earns_nothing():
+    episode = Episode(100)
+    episode.begin(readings(light=(0.96, 0.2), front=True))
+    assert {reward(episode) for reward in REWARDS.values()} == {0.0}
+
+
+def test_commands_have_numbers_and_others_have_none():
+    assert [action_of(*motors) for motors in ACTIONS] == list(range(9))
+    assert action_of(0.3, 1.0) == -1
+
+
+@pytest.mark.parametrize("name", ["simple", "rich"])
+def test_states_are_numbered_with_the_last_variable_fastest(name):
+    percept = PERCEPTS[name]
+    states = list(product(*map(range, percept.sizes)))
+    assert [state_number(percept, state) for state in states] == list(range(math.prod(percept.sizes)))
+    assert state_number(percept, tuple(np.array(states).T)).tolist() == list(range(len(states)))
 
 
 def test_each_percept_has_the_papers_reward():

@@ -10,9 +10,9 @@ from phototaxis.disk import try_file
 from phototaxis.errors import UserError
 from phototaxis.messages import Count, Seed, World
 from phototaxis.seat_client import Mode
+from phototaxis.seated import SeatedAgent
 from phototaxis.session import WorldNames
 
-from phototaxis_agent.agent import Agent
 from phototaxis_agent.policies import load_policy
 from phototaxis_agent.server import serve
 from phototaxis_agent.setup import Setup, parse_setup
@@ -77,8 +77,8 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     policy = load_policy(Path(options.policy), options.trust, options.normalize) if options.policy else None
 
-    def make(world: World) -> Agent:
-        return policy(world, setup.task.cap) if policy else setup.agent(world, seed=options.agent_seed)
+    def make(world: World) -> SeatedAgent:
+        return policy(world, setup.task.max_episode_steps) if policy else setup.agent(world, seed=options.agent_seed)
 
     def serve_world(bus: Bus) -> None:
         path = kept / f"{bus.name}.npz" if kept is not None and worlds else kept

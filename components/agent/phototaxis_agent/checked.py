@@ -3,12 +3,13 @@
 import sys
 import traceback
 from collections.abc import Callable, Mapping
+from copy import copy
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 from phototaxis.checkpoint import learner_hash, storable
 from phototaxis.errors import ComponentFailed, UserError
-from phototaxis.task import Percept, State
+from phototaxis.task import Percept, PerceptState
 
 from phototaxis_agent.learner import Learner, Transition
 
@@ -53,11 +54,11 @@ class CheckedLearner(Learner):
 
     def seen_from(self, where: Callable[[], str]) -> "CheckedLearner":
         """The same learner for a host that counts steps of its own."""
-        other = CheckedLearner.__new__(CheckedLearner)
-        other.__dict__.update(self.__dict__, _where=where)
+        other = copy(self)
+        other._where = where
         return other
 
-    def values(self, state: State) -> list[float]:
+    def values(self, state: PerceptState) -> list[float]:
         try:
             values = self._learner.values(state)
         except BaseException as error:

@@ -9,8 +9,9 @@ from phototaxis.codec import Refused
 from phototaxis.machine import Answer, Ask, Effect, Event, Flush, Publish, Refuse, Reply, Say, Stop
 from phototaxis.messages import CheckpointRequest, Readings, ReadingsOfMany, World
 from phototaxis.seat_client import RELEASE, SEAT, Mode, Place, SeatClient, Seen
+from phototaxis.seated import SeatedAgent
 
-from phototaxis_agent.answering import Answerer, refuse_mode
+from phototaxis_agent.answering import refuse_mode
 from phototaxis_agent.following import bequest
 from phototaxis_agent.keeping import Keeping, Kept, restored
 from phototaxis_agent.rows import row
@@ -47,7 +48,7 @@ class AgentClient:
     def __init__(
         self,
         ident: str,
-        make: Callable[[World], Answerer],
+        make: Callable[[World], SeatedAgent],
         kept: Kept = Kept(),  # noqa: B008 - cannot be changed
         keeps: bool = False,
         mode: Mode = "claim",
@@ -81,7 +82,7 @@ class AgentClient:
         return math.inf if self._session is None else self._session.following.again_at
 
     @property
-    def agent(self) -> Answerer | None:
+    def agent(self) -> SeatedAgent | None:
         """The agent, once it has joined a run."""
         return None if self._session is None else self._session.agent
 

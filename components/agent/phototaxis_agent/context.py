@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from phototaxis.task import ACTIONS, MIRRORED, Percept, State
+from phototaxis.task import ACTIONS, MIRRORED, Percept, PerceptState
 
 SIZES = (len(ACTIONS) + 1, 3)
 """Number of values: the action + 1 (0 for none of the nine), and the trend (0 darker, 1 the same, 2 brighter)."""
@@ -16,7 +16,7 @@ def remember(action: Any, gain: Any) -> tuple[Any, Any]:
     return action + 1, 1 + 1 * (gain > 0) - 1 * (gain < 0)
 
 
-def mirror(percept: Percept, state: State) -> State:
+def mirror(percept: Percept, state: PerceptState) -> PerceptState:
     """What a mirror would show of a state that ends with this context."""
     *seen, action, trend = state
     return *percept.mirror(tuple(seen)), (MIRRORED[int(action) - 1] + 1 if action else 0), trend

@@ -1,41 +1,42 @@
-"""A frozen agent for many robots at once: the same percepts, values and draws as `Agent`, in arrays."""
+"""A frozen policy for many robots at once: the same percepts, values and draws as `Agent`, in arrays."""
 
 import numpy as np
-from phototaxis.task import ACTIONS, CrowdReadings, Memory
+from phototaxis.task import MOTORS, Episode
 
-from phototaxis_agent.agent import Agent
-
-_MOTORS = np.array(ACTIONS)
+from phototaxis_agent.policy import Policy
 
 
 class CrowdAgent:
-    """Drives N robots through one episode each, all of which begin at the same tick."""
+    """Drives N robots through one episode each, all of which begin at the same tick.
 
-    def __init__(self, agent: Agent, near: float, count: int, seed: int):
-        self._learner = agent.learner.seen_from(lambda: f"step {self._step} of an evaluation")
-        self._percept, self._near, self._step = agent.percept, near, 0
-        self._temperature = agent.exploration.cold
+    Parameters
+    ----------
+    near : obstacle threshold of the arena, m.
+    count : N.
+    seed : of the draws.
+    """
+
+    def __init__(self, policy: Policy, near: float, count: int, seed: int):
+        self._learner = policy.learner.seen_from(lambda: f"step {self._step} of an evaluation")
+        self._percept, self._near, self._step = policy.percept, near, 0
+        self._temperature = policy.exploration.cold
         self._rng = np.random.default_rng(seed)
-        self._memory = Memory()
-        self._context = np.tile(np.array(agent.learner.context, dtype=float), (count, 1))
-        self._state: np.ndarray | None = None
+        self._context = np.tile(np.array(policy.learner.context, dtype=float), (count, 1))
+        self._state = np.empty((count, 0))
         self._action = np.zeros(count, int)
 
-    def __call__(self, readings: CrowdReadings) -> np.ndarray:
+    def __call__(self, episode: Episode) -> np.ndarray:
         """The motor commands (N, 2) of one tick."""
-        memory, count = self._memory, len(readings.front)
-        memory.see(readings)
-        if self._state is not None:
-            left, right = memory.before
-            gain = np.maximum(*readings.light) - np.maximum(left, right)
-            remembered = self._learner.remember(tuple(self._state.T.copy()), self._action.copy(), gain)
+        history, count = episode.history, len(self._action)
+        if self._step:
+            remembered = self._learner.remember(tuple(self._state.T.copy()), self._action.copy(), history.gain)
             self._context = columns(remembered, count)
-        percept = columns(self._percept.state(readings, memory, self._near), count)
+        percept = columns(self._percept.state(episode.now, history, self._near), count)
         self._state = np.concatenate([percept, self._context], axis=1)
         choice = draw_many(self._learner.values_of(self._state), self._temperature, self._rng.random(count))
         self._action = np.array(self._percept.actions)[choice]
         self._step += 1
-        return _MOTORS[self._action]
+        return MOTORS[self._action]
 
 
 def columns(values: tuple, count: int) -> np.ndarray:

@@ -7,8 +7,7 @@ from phototaxis.checkpoint import decode, encode
 from phototaxis.errors import UserError
 from phototaxis.machine import Answer, Ask, Effect, Say
 from phototaxis.messages import CheckpointReply, CheckpointRequest, Readings, ReadingsOfMany
-
-from phototaxis_agent.answering import Answerer
+from phototaxis.seated import SeatedAgent
 
 INHERIT_WITHIN_S = 4.0
 """How long a predecessor gets to hand over what it knows; so long a standby waits before it begins again."""
@@ -30,7 +29,7 @@ class Following:
     related : whether the leader has the same learner and percept, None while it does not answer.
     """
 
-    def __init__(self, run: str, agent: Answerer):
+    def __init__(self, run: str, agent: SeatedAgent):
         self._run, self._agent = run, agent
         self.leader = self._named = ""
         self.related: bool | None = False
@@ -116,7 +115,7 @@ class Following:
         return None
 
 
-def bequest(agent: Answerer | None, request: CheckpointRequest) -> CheckpointReply:
+def bequest(agent: SeatedAgent | None, request: CheckpointRequest) -> CheckpointReply:
     """What a successor is told: all that it needs to continue, or why that does not fit."""
     if agent is None:
         return CheckpointReply(reason="knows nothing yet")

@@ -10,8 +10,7 @@ from phototaxis.errors import Unavailable
 from phototaxis.journal import GIVEN_UP
 from phototaxis.machine import Append, Begin, Effect, Save, Unwritten, Warn
 from phototaxis.messages import Readings
-
-from phototaxis_agent.answering import Answerer
+from phototaxis.seated import SeatedAgent
 
 SAVE_EVERY_S = 10.0
 
@@ -64,18 +63,18 @@ class Keeping:
         """Whether a checkpoint is due by the clock."""
         return now >= self._save_at
 
-    def save(self, agent: Answerer, now: float, complete: bool = False, last: bool = False) -> list[Effect]:
+    def save(self, agent: SeatedAgent, now: float, complete: bool = False, last: bool = False) -> list[Effect]:
         """A checkpoint of the present state, unless there is one; of a `complete` run it is tried whether it loads."""
         self._save_at = now + SAVE_EVERY_S
         if not self._wanted or agent.tick == self._saved:
             return []
         meta, arrays = agent.checkpoint()
         if complete or last:
-            agent.learner.prove(arrays)
+            agent.prove(arrays)
         self._saved = agent.tick
         return [Save(meta, arrays, agent.tick[0].encode(), last)]
 
-    def unwritten(self, what: Unwritten, agent: Answerer | None, now: float) -> list[Effect]:
+    def unwritten(self, what: Unwritten, agent: SeatedAgent | None, now: float) -> list[Effect]:
         """The disk did not take something: warn, and replace a journal that was given up by a checkpoint."""
         again = what.what == "journal" and agent is not None and agent.tick != self._saved
         self._saved = None
@@ -94,7 +93,7 @@ class Keeping:
                 yield readings
 
 
-def restored(agent: Answerer, kept: Kept, arena: Any) -> list[Effect]:
+def restored(agent: SeatedAgent, kept: Kept, arena: Any) -> list[Effect]:
     """Continue from the checkpoint on disk; a warning when it learned elsewhere."""
     if kept.checkpoint is None:
         return []

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from msgspec import Struct
 from phototaxis.errors import UserError
-from phototaxis.task import PERCEPTS, Percept, State
+from phototaxis.task import PERCEPTS, Percept, PerceptState
 from phototaxis.words import known, told
 
 GROUP = "phototaxis.learners"
@@ -20,11 +20,11 @@ HINTS = {GROUP: "'phototaxis[agent]'", POLICIES: "'phototaxis[gym]' stable-basel
 class Transition(NamedTuple):
     """One learning step."""
 
-    state: State
+    state: PerceptState
     action: int
     """Index into `phototaxis.task.ACTIONS`."""
     reward: float
-    following: State
+    following: PerceptState
     terminated: bool
     """The light was reached: nothing follows. (An episode cut short is not terminated.)"""
     progress: float
@@ -49,7 +49,7 @@ class Learner:
 
     def __init__(self, options: Any, percept: Percept, rng: np.random.Generator): ...
 
-    def values(self, state: State) -> list[float]:
+    def values(self, state: PerceptState) -> list[float]:
         """Q(state, a) of the actions that the percept allows, in the order of `percept.actions`."""
         raise NotImplementedError
 

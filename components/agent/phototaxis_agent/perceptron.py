@@ -32,7 +32,7 @@ class Hyperparameters(Struct, frozen=True, kw_only=True):
 
 PRESETS: dict[str, dict[str, Any]] = {
     "": {"gamma": 0.9, "hot": 0.03, "cold": 0.01, "rate": 0.3},
-    "rich": {"gamma": 0.3, "hot": 0.1, "cold": 0.02, "rate": 0.1, "cap": 300},
+    "rich": {"gamma": 0.3, "hot": 0.1, "cold": 0.02, "rate": 0.1, "max_episode_steps": 300},
 }
 """What was best for the paper's net; the other nets take the same, so that they can be compared with it."""
 

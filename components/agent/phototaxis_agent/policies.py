@@ -15,7 +15,8 @@ def is_policy(file: Path) -> bool:
 
 
 def load_policy(file: Path, trusted: bool, normalize: str = "") -> Any:
-    """What makes agents of a policy file: called with a world and a step cap it makes one, `crowd(arena)` many.
+    """What makes agents of a policy file: called with a world and `max_episode_steps` it makes one,
+    and `crowd(arena)` drives many robots.
 
     `normalize` names the file with the statistics of the observations, if there is one.
 

@@ -6,13 +6,12 @@ from typing import Any
 
 from phototaxis.machine import Record
 from phototaxis.messages import AgentLog
-
-from phototaxis_agent.answering import Answerer
+from phototaxis.seated import SeatedAgent
 
 TABLE_EVERY_S = 0.5
 
 
-def row(agent: Answerer) -> Record:
+def row(agent: SeatedAgent) -> Record:
     """What the newest tick was for the agent."""
     run, tick = agent.tick
     return Record((agent, run), (tick, *agent.last))

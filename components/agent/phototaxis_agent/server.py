@@ -9,10 +9,10 @@ from phototaxis.journal import Journal
 from phototaxis.messages import World
 from phototaxis.runner import Runner
 from phototaxis.seat_client import Mode
+from phototaxis.seated import SeatedAgent
 from phototaxis.store import Store
 
 from phototaxis_agent import kept
-from phototaxis_agent.answering import Answerer
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.rows import AgentLogs
 from phototaxis_agent.stuck import watched
@@ -20,7 +20,7 @@ from phototaxis_agent.stuck import watched
 
 def serve(
     bus: Bus,
-    make: Callable[[World], Answerer],
+    make: Callable[[World], SeatedAgent],
     path: Path | None,
     resume: Path | None,
     required: bool,

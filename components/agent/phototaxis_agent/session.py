@@ -1,16 +1,17 @@
 """The agent in one run."""
 
 from phototaxis.messages import Readings, ReadingsOfMany, World
+from phototaxis.seated import SeatedAgent
 from phototaxis.topics import TOPICS, step_topics
 
-from phototaxis_agent.answering import Answerer, answering
+from phototaxis_agent.answering import answering
 from phototaxis_agent.following import Following
 
 
 class Session:
     """What belongs to one run: its world and topics, what answers its ticks, and whom the agent follows."""
 
-    def __init__(self, world: World, agent: Answerer):
+    def __init__(self, world: World, agent: SeatedAgent):
         self.world, self.agent = world, agent
         self.topics = step_topics(world.robots)
         self.kind = TOPICS[self.topics.readings].message

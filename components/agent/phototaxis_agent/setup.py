@@ -17,6 +17,7 @@ from phototaxis.words import known, plain
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.exploration import Exploration
 from phototaxis_agent.learner import find
+from phototaxis_agent.policy import Policy
 from phototaxis_agent.stuck import watched
 
 
@@ -45,21 +46,23 @@ class Setup(Struct):
         UserError
             when the learner does not go with the percept, or raises; then it names the file and the line.
         """
-        return self._make(
+        policy = self._policy(
             near=world.arena.sensing.near,
             seed=world.seed if seed is None else seed,
             budget=budget or world.epochs or DEFAULT_BUDGET,
             learning=learning,
-            arena=world.arena,
         )
+        agent = Agent(policy)
+        agent.enter(world.arena)
+        return agent
 
     def check(self) -> None:
-        """Make the agent and throw it away: a UserError before anything else is started, as from `agent`."""
-        self._make(near=1.0, seed=0, budget=1)
+        """Make the policy and throw it away: a UserError before anything else is started, as from `agent`."""
+        self._policy(near=1.0, seed=0, budget=1)
 
-    def _make(self, **given: Any) -> Agent:
+    def _policy(self, **given: Any) -> Policy:
         with watched():
-            return Agent(self.learner, self.hyperparameters, self.task, self.exploration, **given)
+            return Policy(self.learner, self.hyperparameters, self.task, self.exploration, **given)
 
 
 def presets(learner: str, percept: str) -> dict[str, Any]:
@@ -115,7 +118,7 @@ def from_checkpoint(meta: Meta, source: str) -> Setup:
         return Setup(
             meta.learner,
             msgspec.convert(meta.hyperparameters, find(meta.learner).Options),
-            msgspec.convert({"percept": meta.percept, "reward": meta.reward, "cap": meta.cap}, TaskOptions),
+            msgspec.convert({name: getattr(meta, name) for name in TaskOptions.__struct_fields__}, TaskOptions),
             msgspec.convert(meta.exploration, Exploration),
         )
     except msgspec.ValidationError as error:

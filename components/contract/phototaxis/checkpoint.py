@@ -19,9 +19,8 @@ from phototaxis.disk import write_whole
 from phototaxis.errors import UserError
 from phototaxis.messages import End, Motor
 
-FORMAT = 2
-OLDEST = 1
-"""The oldest format that is read; it lacks `arena_digest`."""
+FORMAT = 3
+"""The version of what `Meta` holds; other versions are refused."""
 _LIMIT = 1_000_000_000
 _SPARE = 1_000_000
 """Bytes of a file that are not the arrays' own."""
@@ -36,7 +35,7 @@ class Meta(Struct, forbid_unknown_fields=True, kw_only=True):
     learner: str
     percept: str
     reward: str
-    cap: int
+    max_episode_steps: int
     hyperparameters: dict[str, Any]
     exploration: dict[str, Any]
     budget: int
@@ -48,7 +47,7 @@ class Meta(Struct, forbid_unknown_fields=True, kw_only=True):
     epoch: int
     steps: int
     lights: list[tuple[float, float]]
-    """The percept's history."""
+    """The last light readings, as in `LightHistory.lights`."""
     state: tuple[float, ...]
     """The last state: percept and learner's context; empty for none."""
     linked: bool
@@ -61,16 +60,14 @@ class Meta(Struct, forbid_unknown_fields=True, kw_only=True):
     """How often each percept was met."""
     arena: str
     """Name of the arena in which it learned last."""
-    arena_digest: str = ""
-    """`Arena.digest` of that arena; "" where it is not known."""
+    arena_digest: str
+    """`Arena.digest` of that arena; "" where it has learned in none."""
     learner_hash: str
 
     def elsewhere(self, arena: Arena) -> str:
-        """A sentence about where it learned, if that is not known to be this arena; else ""."""
+        """A sentence about where it learned, if that is not this arena; else ""."""
         if self.arena_digest == arena.digest:
             return ""
-        if not self.arena_digest:
-            return f"learned in an arena called '{self.arena}'; whether it is this one, the file is too old to say"
         there, here = f"'{self.arena}' ({self.arena_digest})", f"'{arena.name}' ({arena.digest})"
         return f"learned in the arena {there}, which is another world than {here}"
 
@@ -147,8 +144,9 @@ def decode(data: bytes, source: str) -> tuple[Meta, dict[str, np.ndarray]]:
             arrays = {name: stored[name] for name in stored.files}
         text = arrays.pop("meta").tobytes()
         written = msgspec.json.decode(text, type=_Header).format
-        if not OLDEST <= written <= FORMAT:
-            raise UserError(f"{source}: checkpoint format {written}, this version reads {OLDEST} to {FORMAT}")
+        if written != FORMAT:
+            age = "an older" if written < FORMAT else "a newer"
+            raise UserError(f"{source}: made by {age} version (checkpoint format {written}, not {FORMAT}); train again")
         meta = msgspec.json.decode(text, type=Meta)
     except (zipfile.BadZipFile, EOFError, zlib.error) as error:
         raise UserError(f"{source}: not a checkpoint, or truncated: {error}") from None

@@ -40,7 +40,7 @@ TOPICS = {
         Topic("crowd/state", m.StateOfMany, "sim", "stream", 1_000_000, "the same of many robots at once"),
         Topic("crowd/readings", m.ReadingsOfMany, "sensors", "stream", 2_000_000, "the same of many robots at once"),
         Topic("crowd/command", m.CommandOfMany, "agent", "stream", 200_000, "the same for many robots at once"),
-        Topic("episode", m.Episode, "sim", "stream", 4_096, "one episode, when it has ended"),
+        Topic("episode", m.EndedEpisode, "sim", "stream", 4_096, "one episode, when it has ended"),
         Topic("status", m.Status, "sim", "stream", 32_768, "how the run is doing, 5 times a second"),
         Topic(
             "control",

@@ -6,12 +6,12 @@ Importing this registers them. Gymnasium does so itself when the name says where
 
 import gymnasium
 
-CAP = 300
+MAX_EPISODE_STEPS = 300
 """Steps after which an episode is truncated, unless `max_episode_steps` says otherwise."""
 
 gymnasium.register(
     "phototaxis/LightSeeker-v0",
     entry_point="phototaxis_gym.single:LightSeeker",
     vector_entry_point="phototaxis_gym.vector:LightSeekers",
-    max_episode_steps=CAP,
+    max_episode_steps=MAX_EPISODE_STEPS,
 )

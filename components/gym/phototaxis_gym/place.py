@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from phototaxis.arena import Arena
 from phototaxis.messages import End, Readings
-from phototaxis.task import CrowdReadings
+from phototaxis.task import BatchObservation
 from phototaxis_sensors.crowd import CrowdSuite
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim.many import SimulationOfMany
@@ -59,15 +59,15 @@ class Places(Protocol):
         """Of the newest readings."""
         ...
 
-    def begin(self, seeds: Sequence[int], starts: Mapping[int, Pose]) -> CrowdReadings:
+    def begin(self, seeds: Sequence[int], starts: Mapping[int, Pose]) -> BatchObservation:
         """A run in which robot i is placed as with `seeds[i]`, or at `starts[i]`."""
         ...
 
-    def drive(self, motors: np.ndarray, ends: np.ndarray) -> CrowdReadings:
+    def drive(self, motors: np.ndarray, ends: np.ndarray) -> BatchObservation:
         """Hold motors (2, N); robots with an end (index into `ENDS`, not 0) are placed anew instead."""
         ...
 
-    def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> CrowdReadings:
+    def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> BatchObservation:
         """Place the robots with an end anew while the others wait: as with another seed, or at a pose."""
         ...
 
@@ -86,7 +86,7 @@ class ManyHere:
         self.arena = arena
         self.poses: np.ndarray | None = None
 
-    def begin(self, seeds: Sequence[int], starts: Mapping[int, Pose]) -> CrowdReadings:
+    def begin(self, seeds: Sequence[int], starts: Mapping[int, Pose]) -> BatchObservation:
         self._seeds, self._noise_seed = list(seeds), seeds[0]
         self._simulation = SimulationOfMany(self.arena, seeds[0], AUTHOR, 0, len(seeds), seeds, starts)
         self._suite = CrowdSuite(self._simulation.world)
@@ -98,13 +98,13 @@ class ManyHere:
     def tick(self) -> int:
         return self._simulation.tick
 
-    def drive(self, motors: np.ndarray, ends: np.ndarray) -> CrowdReadings:
+    def drive(self, motors: np.ndarray, ends: np.ndarray) -> BatchObservation:
         self._simulation.drive(motors, ends)
         self._journal.append(motors)
         self._ages += 1
         return self._placed(ends > 0)
 
-    def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> CrowdReadings:
+    def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> BatchObservation:
         rows = np.flatnonzero(ends)
         for row in rows.tolist():
             self._seeds[row] = seeds.get(row, self._seeds[row])
@@ -115,7 +115,7 @@ class ManyHere:
     def close(self) -> None:
         """Nothing is held."""
 
-    def _placed(self, fresh: np.ndarray) -> CrowdReadings:
+    def _placed(self, fresh: np.ndarray) -> BatchObservation:
         """Note which episodes have begun; forget the commands of those that are over."""
         self._ages[fresh] = 0
         self._starts[fresh] = self._simulation.poses[fresh]
@@ -123,10 +123,10 @@ class ManyHere:
             self._journal.popleft()
         return self._sense()
 
-    def _sense(self) -> CrowdReadings:
+    def _sense(self) -> BatchObservation:
         simulation = self._simulation
         self.poses = simulation.poses
-        return CrowdReadings(*self._suite(simulation.tick, simulation.poses), simulation.front, simulation.rear)
+        return BatchObservation(*self._suite(simulation.tick, simulation.poses), simulation.front, simulation.rear)
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {name: value for name, value in vars(self).items() if name not in ("_simulation", "_suite")}

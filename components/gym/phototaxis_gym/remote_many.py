@@ -7,7 +7,7 @@ from gymnasium.error import Error
 from phototaxis.codec import Refused
 from phototaxis.columns import FLAG, pack, unpack
 from phototaxis.messages import CommandOfMany, ReadingsOfMany
-from phototaxis.task import CrowdReadings
+from phototaxis.task import BatchObservation
 from phototaxis_sim.physics import Pose
 
 from phototaxis_gym.link import Link, refuse_poses
@@ -32,14 +32,14 @@ class ManyThere:
     def tick(self) -> int:
         return self._link.tick
 
-    def begin(self, seeds: Sequence[int], starts: Mapping[int, Pose]) -> CrowdReadings:
+    def begin(self, seeds: Sequence[int], starts: Mapping[int, Pose]) -> BatchObservation:
         """A new run; the seeds must follow one another."""
         refuse_poses(starts)
         if list(seeds) != list(range(seeds[0], seeds[0] + self._count)):
             raise Error(f"{FOLLOW}: give reset one number")
         return self._senses(self._link.begin(seeds[0]))
 
-    def drive(self, motors: np.ndarray, ends: np.ndarray) -> CrowdReadings:
+    def drive(self, motors: np.ndarray, ends: np.ndarray) -> BatchObservation:
         left, right, end = pack(motors[0]), pack(motors[1]), pack(ends, FLAG)
         ident = self._link.ident
         return self._senses(
@@ -48,7 +48,7 @@ class ManyThere:
             )
         )
 
-    def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> CrowdReadings:
+    def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> BatchObservation:
         """One tick, in which the others hold still."""
         refuse_poses(starts)
         if seeds:
@@ -59,10 +59,10 @@ class ManyThere:
         """Leave the seat and the bus."""
         self._link.close()
 
-    def _senses(self, readings: ReadingsOfMany) -> CrowdReadings:
+    def _senses(self, readings: ReadingsOfMany) -> BatchObservation:
         try:
             sonar, light = unpack(readings.sonar, self._count, 16), unpack(readings.light, self._count, 2)
             front, rear = unpack(readings.contact, self._count, 2, FLAG).astype(bool)
         except Refused as why:
             raise Error(f"the sensors' readings cannot be used: {why}") from None
-        return CrowdReadings(sonar, light, front, rear)
+        return BatchObservation(sonar, light, front, rear)

@@ -8,25 +8,32 @@ from gymnasium import spaces
 from gymnasium.error import Error
 from gymnasium.vector.utils import iterate
 from phototaxis.arena import Arena
-from phototaxis.task import ACTIONS, OWN_REWARD, PERCEPTS, REWARDS, Percept, Reward
+from phototaxis.task import (
+    ACTIONS,
+    MOTORS,
+    OWN_REWARD,
+    PERCEPTS,
+    REWARDS,
+    LightHistory,
+    Observation,
+    Percept,
+    Reward,
+    state_number,
+)
 
 from phototaxis_gym.errors import WrongAction, WrongCount, WrongSteps
 
 ROUNDING = 1e-6
 """How far a wheel command may lie outside of −1..1: what arithmetic in float32 makes of ±1. It is clipped."""
-MOTORS = np.array(ACTIONS)
-"""(9, 2): the motor commands of the discrete actions."""
 
 
-class Observation(Protocol):
-    """One way to see."""
+class Observer(Protocol):
+    """Makes an environment's observation, (N, …) for N robots, of what robots observe and of the steps before."""
 
     @property
     def space(self) -> spaces.Space[Any]: ...
 
-    def __call__(self, senses: Any, memory: Any) -> Any:
-        """From readings (of numbers, or of arrays (N,)) to an observation, (N, …) for many."""
-        ...
+    def __call__(self, observation: Observation, history: LightHistory) -> Any: ...
 
 
 class States:
@@ -34,13 +41,10 @@ class States:
 
     def __init__(self, percept: Percept, near: float):
         self._percept, self._near = percept, near
-        sizes = percept.sizes
-        self._strides = [math.prod(sizes[i + 1 :]) for i in range(len(sizes))]
-        self.space = spaces.Discrete(math.prod(sizes))
+        self.space = spaces.Discrete(math.prod(percept.sizes))
 
-    def __call__(self, senses: Any, memory: Any) -> Any:
-        state = self._percept.state(senses, memory, self._near)
-        return sum(variable * stride for variable, stride in zip(state, self._strides, strict=True))
+    def __call__(self, observation: Observation, history: LightHistory) -> Any:
+        return state_number(self._percept, self._percept.state(observation, history, self._near))
 
 
 class Numbers:
@@ -50,8 +54,8 @@ class Numbers:
         self._percept, self._near = percept, near
         self.space = spaces.Box(-1.0, 1.0, (len(percept.sizes),), np.float32)
 
-    def __call__(self, senses: Any, memory: Any) -> Any:
-        return _rows(self._percept.state(senses, memory, self._near))
+    def __call__(self, observation: Observation, history: LightHistory) -> Any:
+        return _rows(self._percept.state(observation, history, self._near))
 
 
 class Sensors:
@@ -61,8 +65,8 @@ class Sensors:
         high = [1.0] * 2 + [arena.robot.sonar_range] * 16 + [1.0] * 2
         self.space = spaces.Box(np.zeros(20, np.float32), np.array(high, np.float32))
 
-    def __call__(self, senses: Any, memory: Any) -> Any:
-        return _rows((*senses.light, *senses.sonar, senses.front, senses.rear))
+    def __call__(self, observation: Observation, history: LightHistory) -> Any:
+        return _rows((*observation.light, *observation.sonar, observation.front, observation.rear))
 
 
 def _rows(variables: tuple[Any, ...]) -> np.ndarray:
@@ -86,8 +90,8 @@ def valid_percept(percept: str) -> str:
     return percept
 
 
-def observation(percept: str, arena: Arena) -> Observation:
-    """The observation that `percept` names."""
+def observer(percept: str, arena: Arena) -> Observer:
+    """What makes the observation that `percept` names."""
     if percept == "sensors":
         return Sensors(arena)
     found, near = PERCEPTS[percept], arena.sensing.near
@@ -173,8 +177,8 @@ def _numbers(action: Any) -> np.ndarray:
     return given.astype(float) if given.dtype.kind in "biuf" else np.empty(0)
 
 
-def valid_cap(cap: int, option: str = "cap") -> int:
-    """The steps of an episode, at least one; `option` names what they were given as.
+def valid_steps(max_episode_steps: int) -> int:
+    """The steps of an episode, at least one.
 
     Raises
     ------
@@ -183,8 +187,8 @@ def valid_cap(cap: int, option: str = "cap") -> int:
     WrongSteps
         for fewer than one.
     """
-    if not isinstance(cap, int | np.integer):
-        raise TypeError(f"{option} {cap!r}: a whole number of steps is needed")
-    if cap < 1:
-        raise WrongSteps(f"{option} {cap}: an episode has at least one step")
-    return cap
+    if not isinstance(max_episode_steps, int | np.integer):
+        raise TypeError(f"max_episode_steps {max_episode_steps!r}: a whole number of steps is needed")
+    if max_episode_steps < 1:
+        raise WrongSteps(f"max_episode_steps {max_episode_steps}: an episode has at least one step")
+    return max_episode_steps

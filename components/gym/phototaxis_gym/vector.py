@@ -10,20 +10,17 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from phototaxis.errors import UserError
-from phototaxis.messages import ENDS
-from phototaxis.task import CrowdReadings, lit
+from phototaxis.task import BatchObservation, Episode
+from phototaxis.task.episode import RESET
 from phototaxis_sim import arenas
 
-from phototaxis_gym import CAP
+from phototaxis_gym import MAX_EPISODE_STEPS
 from phototaxis_gym.draw import SIDE, Canvas, Window, frame_rate, tiles
 from phototaxis_gym.errors import EpisodeOver
-from phototaxis_gym.memories import Memories
 from phototaxis_gym.place import ManyHere, Places
 from phototaxis_gym.remote_many import ManyThere
 from phototaxis_gym.resets import given_poses, reset_mask, row_seeds, run_seed
-from phototaxis_gym.spaces import actions, motors_of_many, observation, rewards, valid_cap, valid_percept
-
-REACHED, CAPPED, ASKED = (ENDS.index(end) for end in ("reached", "cap", "asked"))
+from phototaxis_gym.spaces import actions, motors_of_many, observer, rewards, valid_percept, valid_steps
 
 
 class LightSeekers(VectorEnv[Any, Any, Any]):
@@ -35,8 +32,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
 
     Parameters
     ----------
-    max_episode_steps : steps after which an episode is truncated; −1 for no limit, None for 300. `cap` takes the
-        place of the usual 300, and lowers any other.
+    max_episode_steps : steps after which an episode is truncated; −1 for no limit, None for 300.
     render_mode : None, "rgb_array" (`render` returns one picture for each robot) or "human" (all in one window).
     autoreset_mode : what becomes of a robot whose episode has ended. NEXT_STEP: the next step places it anew and
         ignores its action. SAME_STEP: it is placed anew at once; `info` has "final_obs" and "final_info". DISABLED:
@@ -58,12 +54,11 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         arena: str = "",
         reward: str = "own",
         action: Literal["discrete", "continuous"] = "discrete",
-        cap: int | None = None,
         render_mode: str | None = None,
         connect: str = "",
         world: str = "phototaxis",
         timeout: float = 10.0,
-        max_episode_steps: int | None = CAP,
+        max_episode_steps: int | None = MAX_EPISODE_STEPS,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         disable_env_checker: bool | None = None,
     ):
@@ -75,13 +70,9 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
             raise Error(f"no render_mode '{render_mode}' for many robots; there are: {', '.join(modes)}")
         if num_envs < 1:
             raise Error(f"num_envs {num_envs}: at least one robot is needed")
-        if max_episode_steps is None:
-            max_episode_steps = CAP
-        elif max_episode_steps != -1:
-            valid_cap(max_episode_steps, "max_episode_steps")
-        usual = cap is not None and max_episode_steps == CAP
-        limit = np.inf if max_episode_steps == -1 or usual else max_episode_steps
-        self.num_envs, self._cap = num_envs, limit if cap is None else min(valid_cap(cap), limit)
+        steps = MAX_EPISODE_STEPS if max_episode_steps is None else max_episode_steps
+        self._episode = Episode(np.inf if steps == -1 else valid_steps(steps), num_envs)
+        self.num_envs = num_envs
         self._reward, self.single_action_space = rewards(reward, valid_percept(percept)), actions(action)
         self._mode, self.render_mode = AutoresetMode(autoreset_mode), render_mode
         try:
@@ -95,7 +86,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         self._arena = self._place.arena
         fps = frame_rate(self._arena)
         self.metadata = {"render_modes": modes, "render_fps": fps, "autoreset_mode": self._mode}
-        self._observe = observation(percept, self._arena)
+        self._observe = observer(percept, self._arena)
         self.single_observation_space = self._observe.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -103,9 +94,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         side = SIDE if self._window is None else max(2 * SIDE // int(np.ceil(np.sqrt(num_envs))), 1)
         self._canvas = Canvas(self._arena, min(side, SIDE)) if render_mode else None
         self._seeds: list[int] | None = None
-        self._readings: Any = None
-        self._episodes, self._steps = np.zeros(num_envs, int), np.zeros(num_envs, int)
-        self._ends, self._memory = np.zeros(num_envs, np.uint8), Memories(num_envs)
+        self._episodes, self._ends = np.zeros(num_envs, int), np.zeros(num_envs, np.uint8)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override] - as SyncVectorEnv has it
@@ -125,24 +114,24 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         count = self.num_envs
         mask, starts = reset_mask(options, count), given_poses(options, self._arena, count)
         rows, seeds = np.flatnonzero(mask).tolist(), row_seeds(seed, count)
-        if self._readings is None and not mask.all():
+        if self._episode.now is None and not mask.all():
             raise ResetNeeded("the first reset() is of all robots; leave reset_mask out")
         known = self.np_random_seed
         used = [known[row] if one is None or not mask[row] else one for row, one in enumerate(seeds)]
-        if mask.all() and (self._readings is None or None not in seeds):
-            senses = self._place.begin([run_seed(one) for one in used], starts)
+        if mask.all() and (self._episode.now is None or None not in seeds):
+            observation = self._place.begin([run_seed(one) for one in used], starts)
             super().reset(seed=used[0])
-            self._episodes, self._memory = np.zeros(count, int), Memories(count)
-            self._take(senses)
+            self._episodes = np.zeros(count, int)
+            self._episode.begin(observation)
         else:
             new = {row: run_seed(used[row]) for row in rows if seeds[row] is not None}
             self._renew(mask, new, {row: start for row, start in starts.items() if mask[row]})
-        self._seeds, self._steps[mask], self._ends[mask] = used, 0, 0
+        self._seeds, self._ends[mask] = used, 0
         return self._look(), self._info(mask)
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold an action for one control period."""
-        if self._readings is None:
+        if self._episode.now is None:
             raise ResetNeeded("reset() comes before step()")
         motors = motors_of_many(self.action_space, self.single_action_space, actions, self.num_envs)
         fresh = self._ends > 0
@@ -150,15 +139,12 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
             over = np.flatnonzero(fresh).tolist()
             raise EpisodeOver(f"the episodes of the robots {over} have ended: reset(options={{'reset_mask': …}}) first")
         self._episodes += fresh
-        self._steps = np.where(fresh, 0, self._steps + 1)
-        self._memory.forget(fresh)
-        senses = self._take(self._place.drive(motors.T, self._ends))
-        seen, memory = self._look(), self._memory
-        reward = self._reward.many(np.maximum(*memory.before), senses, memory.unchanged)
-        terminated, truncated = np.asarray(lit(senses)), self._steps >= self._cap
-        for column in (reward, terminated, truncated):
-            column[fresh] = 0
-        self._ends = np.where(terminated, REACHED, np.where(truncated, CAPPED, 0)).astype(np.uint8)
+        episode = self._episode
+        episode.step(self._place.drive(motors.T, self._ends))
+        episode.begin(episode.now, fresh)
+        seen, reward = self._look(), self._reward(episode)
+        terminated, truncated = episode.terminated & ~fresh, episode.truncated
+        self._ends = np.where(fresh, 0, episode.end).astype(np.uint8)
         info: dict[str, Any] = {}
         if self._mode == AutoresetMode.SAME_STEP and (over := self._ends > 0).any():
             rows = self._info(over)
@@ -166,18 +152,18 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
                 final = {key: rows[key][row] for key in rows if not key.startswith("_")}
                 info = self._add_info(info, {"final_obs": seen[row], "final_info": final}, row)
             self._renew(over, {}, {})
-            self._steps[over], self._ends[over] = 0, 0
+            self._ends[over] = 0
             seen = self._look()
         return seen, reward, terminated, truncated, {**info, **self._info(np.ones(self.num_envs, bool))}
 
     def render(self) -> tuple[Any, ...]:
         """A picture of each robot, (height, width, 3) uint8; None where they go to a window."""
-        if self._readings is None:
+        if self._episode.now is None:
             raise ResetNeeded("reset() comes before render()")
         if self._canvas is None:
             logger.warn("render() without a render_mode shows nothing; give gymnasium.make_vec one, as 'rgb_array'")
             return (None,) * self.num_envs
-        poses, sonar = np.asarray(self._place.poses).tolist(), self._readings.sonar.T.tolist()
+        poses, sonar = np.asarray(self._place.poses).tolist(), self._episode.now.sonar.T.tolist()
         pictures = tuple(self._canvas.draw(pose, rays) for pose, rays in zip(poses, sonar, strict=True))
         if self._window is None:
             return pictures
@@ -192,24 +178,17 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
 
     def _renew(self, mask: np.ndarray, seeds: dict[int, int], starts: dict[int, Any]) -> None:
         """Begin new episodes of some robots; the others see what they have seen."""
-        ends = np.where(mask, np.where(self._ends > 0, self._ends, ASKED), 0).astype(np.uint8)
-        pairs = zip(self._place.renew(ends, seeds, starts), self._readings, strict=True)
-        self._readings = CrowdReadings(*(np.where(mask, new, old) for new, old in pairs))
+        ends = np.where(mask, np.where(self._ends > 0, self._ends, RESET), 0).astype(np.uint8)
+        pairs = zip(self._place.renew(ends, seeds, starts), self._episode.now, strict=True)
+        self._episode.begin(BatchObservation(*(np.where(mask, new, old) for new, old in pairs)), mask)
         self._episodes[mask] += 1
         self._episodes[list(seeds)] = 0
-        self._memory.begin(self._readings, mask)
-
-    def _take(self, senses: CrowdReadings) -> CrowdReadings:
-        """Remember the readings of a step."""
-        self._readings = senses
-        self._memory.see(senses)
-        return senses
 
     def _look(self) -> Any:
         """The observations."""
         if self._window is not None:
             self.render()
-        return np.asarray(self._observe(self._readings, self._memory), self.single_observation_space.dtype)
+        return np.asarray(self._observe(self._episode.now, self._episode.history), self.single_observation_space.dtype)
 
     def _info(self, mask: np.ndarray) -> dict[str, Any]:
         """The `info` of those robots as SyncVectorEnv has it: an array for each key, with a mask."""
@@ -217,5 +196,5 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         columns = {} if poses is None else {"pose": poses.copy()}
         columns["tick"] = np.full(count, self._place.tick)
         columns["episode_number"] = self._episodes.copy()
-        columns["is_success"] = np.asarray(lit(self._readings))
+        columns["is_success"] = self._episode.terminated
         return {**columns, **{f"_{key}": mask.copy() for key in columns}}

@@ -41,7 +41,7 @@ class System(Struct, frozen=True):
     def of(cls, setup: Setup, arena: str) -> "System":
         """The system of a setup, every option spelt out."""
         options = msgspec.to_builtins(setup.hyperparameters) | msgspec.to_builtins(setup.exploration)
-        options["cap"] = setup.task.cap
+        options["max_episode_steps"] = setup.task.max_episode_steps
         return cls(setup.learner, setup.task.percept, setup.task.reward, arena, tuple(options.items()))
 
     def check(self) -> None:
@@ -99,12 +99,13 @@ def learn(cell: Cell) -> Learned:
     arena = arenas.load(cell.system.arena)
     world = World(run="lab", arena=arena, seed=cell.seed, epochs=cell.epochs)
     agent = cell.system.setup().agent(world)
+    policy = agent.policy
     loop = Loop(arena, agent, cell.seed, cell.epochs)
     rewards, speeds = np.zeros(cell.epochs), np.zeros(cell.epochs)
     while not loop.simulation.finished:
-        epoch = agent.epoch
+        epoch = policy.epoch
         ended = loop.step()
-        if agent.epoch > epoch:
+        if policy.epoch > epoch:
             rewards[epoch] = agent.last.reward
         if ended is None:
             speeds[loop.simulation.state.epoch - 1] = sum(ACTIONS[agent.last.action])
@@ -118,8 +119,8 @@ def run(cell: Cell) -> Outcome:
     """Learn, freeze, measure on 200 fresh placements; everything follows from the cell."""
     agent, loop, rewards, speeds = learn(cell)
     meta, _ = agent.checkpoint()
-    agent.learning = False
-    found = evaluate(loop.simulation.world.arena, agent, PLACEMENTS, cell.seed)
+    agent.policy.learning = False
+    found = evaluate(loop.simulation.world.arena, agent.policy, PLACEMENTS, cell.seed)
     marks = np.linspace(0, cell.epochs, CURVE + 1).astype(int)[1:] - 1
     return Outcome(
         seed=cell.seed,

@@ -145,7 +145,7 @@ class Trial:
         command = self._await("command", self._within)
         fault = self._fault(command)
         return fault or (
-            "" if command is not None and command.end == "reached" else f"its command does not end it: {command}"
+            "" if command is not None and command.end == "terminated" else f"its command does not end it: {command}"
         )
 
     def _older(self) -> str:
@@ -159,7 +159,7 @@ class Trial:
         return "" if command is None else f"it answered {command}"
 
     def _steps_down(self) -> str:
-        self._simulation.advance(0.0, 0.0, self._agent, "reached")
+        self._simulation.advance(0.0, 0.0, self._agent, "terminated")
         self._ask("another")
         command = self._await("command", SILENCE)
         return "" if command is None else f"it answered {command}"

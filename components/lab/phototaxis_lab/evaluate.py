@@ -26,7 +26,7 @@ class Options(Struct, kw_only=True):
     """decides the placements and the policy's draws; never those of a training"""
     arena: str = ""
     """another arena than the one of the training (which a .zip does not name: then paper)"""
-    cap: Annotated[int, Meta(ge=1)] = 300
+    max_episode_steps: Annotated[int, Meta(ge=1)] = 300
     """steps after which a placement counts as failed"""
     trust: bool = False
     """load a .zip although such a file can run any code: you trust who made it"""
@@ -52,20 +52,24 @@ def main(argv: Sequence[str]) -> int:
     path = Path(options.checkpoint)
     if is_policy(path):
         arena = arenas.enter(options.arena or "paper")
-        policy = load_policy(path, options.trust, options.normalize)
-        crowd = policy.crowd(arena)
-        with choose(fmus) as sensors, Progress(options.cap, "steps") as progress:
-            found = measure(arena, crowd, options.placements, options.seed, options.cap, sensors, progress.add)
+        crowd = load_policy(path, options.trust, options.normalize).crowd(arena)
+        with choose(fmus) as sensors, Progress(options.max_episode_steps, "steps") as progress:
+            found = measure(
+                arena, crowd, options.placements, options.seed, options.max_episode_steps, sensors, progress.add
+            )
         return tell(found, {"arena": options.arena or arena.name, "arena_digest": arena.digest}, options.json)
     if options.normalize:
         raise UserError(f"{path}: --normalize belongs to a policy that Stable-Baselines3 has saved (.zip)")
     meta, arrays = load(path)
     arena = where(path, meta, options.arena)
     setup = from_checkpoint(meta, str(path))
-    agent = setup.agent(World(run="evaluation", arena=arena, seed=options.seed + SEED_OFFSET, epochs=0), learning=False)
-    agent.take_over(meta, arrays, str(path))
-    with watched(), choose(fmus) as sensors, Progress(options.cap, "steps") as progress:
-        found = evaluate(arena, agent, options.placements, options.seed, options.cap, sensors, progress.add)
+    world = World(run="evaluation", arena=arena, seed=options.seed + SEED_OFFSET, epochs=0)
+    policy = setup.agent(world, learning=False).policy
+    policy.take_over(meta, arrays, str(path))
+    with watched(), choose(fmus) as sensors, Progress(options.max_episode_steps, "steps") as progress:
+        found = evaluate(
+            arena, policy, options.placements, options.seed, options.max_episode_steps, sensors, progress.add
+        )
     place = {
         "arena": options.arena or arena.name,
         "arena_digest": arena.digest,
@@ -98,7 +102,7 @@ def where(path: Path, meta: Checkpoint, given: str) -> Arena:
         raise UserError(f"{path}: learned in the arena '{meta.arena}', which is not shipped; give its file: --arena")
     arena = arenas.enter(given or meta.arena)
     if other := meta.elsewhere(arena):
-        if not given and meta.arena_digest:
+        if not given:
             raise UserError(f"{path}: {other}; give the file of the one, or the name of the other: --arena")
         warn(f"{path}: {other}")
     return arena

@@ -3,7 +3,7 @@
 import time
 
 from phototaxis.arena import Arena
-from phototaxis.messages import Episode, World
+from phototaxis.messages import EndedEpisode, World
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.setup import Setup
 from phototaxis_sensors.suite import Make, SensorSuite, built_in
@@ -20,7 +20,7 @@ class Loop:
         self.sensors = SensorSuite(self.simulation.world, make)
         self.agent = agent
 
-    def step(self) -> Episode | None:
+    def step(self) -> EndedEpisode | None:
         """One tick; the episode that it ended, if any."""
         command = self.agent(self.sensors(self.simulation.state))
         self.simulation.advance(command.left, command.right, command.author, command.end)

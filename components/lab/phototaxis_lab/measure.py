@@ -7,9 +7,9 @@ import numpy as np
 from msgspec import Struct
 from phototaxis.arena import Arena
 from phototaxis.messages import World
-from phototaxis.task import REACHED, CrowdReadings, lit
-from phototaxis_agent.agent import Agent
+from phototaxis.task import GOAL_LIGHT, BatchObservation, Episode
 from phototaxis_agent.crowd import CrowdAgent
+from phototaxis_agent.policy import Policy
 from phototaxis_sensors.choice import BuiltInChoice, Choice
 from phototaxis_sim.crowd import Crowd
 from phototaxis_sim.physics import Physics, Pose
@@ -17,7 +17,7 @@ from phototaxis_sim.physics import Physics, Pose
 SEED_OFFSET = 1_000_000_007
 """Added to an evaluation's seed, so that its placements and noise are none of the training's."""
 
-CAP = 300
+MAX_EPISODE_STEPS = 300
 """Steps after which a placement counts as failed."""
 
 
@@ -26,14 +26,14 @@ class Evaluation(Struct):
 
     placements: int
     success_rate: float
-    """Share of placements from which the light was reached within the step cap."""
+    """Share of placements from which the light was reached within `max_episode_steps`."""
     steps_mean: float | None
     """Mean steps of the successful placements; None without any."""
     path_ratio: float | None
     """All steps of the successful placements over the steps of their direct ways (`direct_steps`)."""
     within_100: float
     """Share of placements from which the light was reached within 100 steps."""
-    cap: int
+    max_episode_steps: int
     seed: int
 
 
@@ -47,9 +47,9 @@ def direct_steps(arena: Arena, start: Pose) -> float:
     fewest = math.inf
     for light in arena.lights:
         if law.light_law == "linear":
-            radius = law.light_range * (1 - REACHED / light.brightness)
+            radius = law.light_range * (1 - GOAL_LIGHT / light.brightness)
         else:
-            radius = math.sqrt(light.brightness / REACHED)
+            radius = math.sqrt(light.brightness / GOAL_LIGHT)
         dx, dy = light.position[0] - start.x, light.position[1] - start.y
         turn = abs(math.remainder(math.atan2(dy, dx) - start.heading, math.tau))
         straight = max(math.hypot(dx, dy) - radius - ahead, 0.0)
@@ -62,54 +62,56 @@ BUILT_IN = BuiltInChoice()
 
 def evaluate(
     arena: Arena,
-    agent: Agent,
+    policy: Policy,
     placements: int,
     seed: int,
-    cap: int = CAP,
+    max_episode_steps: int = MAX_EPISODE_STEPS,
     sensors: Choice = BUILT_IN,
     stepped: Callable[[], object] = lambda: None,
 ) -> Evaluation:
-    """Place `placements` robots at random, one at a place, and let the frozen agent drive each for `cap` steps.
+    """Place `placements` robots at random, and let the frozen policy drive each of them for an episode.
 
-    `stepped` is called when all have made one more of them.
+    `stepped` is called when all have made one more step.
     """
-    if agent.learning:
-        raise ValueError("an agent that is evaluated must not learn")
-    policy = CrowdAgent(agent, arena.sensing.near, placements, seed)
-    return measure(arena, policy, placements, seed, cap, sensors, stepped)
+    if policy.learning:
+        raise ValueError("a policy that is evaluated must not learn")
+    crowd = CrowdAgent(policy, arena.sensing.near, placements, seed)
+    return measure(arena, crowd, placements, seed, max_episode_steps, sensors, stepped)
 
 
-Policy = Callable[[CrowdReadings], np.ndarray]
-"""From what N robots sense to their motor commands, (N, 2)."""
+Drive = Callable[[Episode], np.ndarray]
+"""From the episodes of N robots, after their newest observation, to motor commands (N, 2)."""
 
 
 def measure(
     arena: Arena,
-    policy: Policy,
+    drive: Drive,
     placements: int,
     seed: int,
-    cap: int = CAP,
+    max_episode_steps: int = MAX_EPISODE_STEPS,
     sensors: Choice = BUILT_IN,
     stepped: Callable[[], object] = lambda: None,
 ) -> Evaluation:
-    """The same for any policy."""
+    """Place `placements` robots at random, as `evaluate` does, and let `drive` drive them."""
     seed += SEED_OFFSET
     physics = Physics(arena)
     starts = [physics.random_pose(np.random.default_rng((seed, number))) for number in range(placements)]
-    crowd, suite = (
-        Crowd(arena, starts),
-        sensors.crowd(World(run="evaluation", arena=arena, seed=seed, epochs=0), placements),
-    )
-    steps = np.full(placements, -1)
-    for step in range(cap + 1):
-        readings = CrowdReadings(*suite(step, crowd.poses), crowd.front, crowd.rear)
-        steps[(steps < 0) & lit(readings)] = step
-        if step == cap or (steps >= 0).all():
-            break
-        left, right = np.where(steps < 0, policy(readings).T, 0.0)
-        crowd.drive(left, right)
+    crowd = Crowd(arena, starts)
+    suite = sensors.crowd(World(run="evaluation", arena=arena, seed=seed, epochs=0), placements)
+
+    def observe(tick: int) -> BatchObservation:
+        return BatchObservation(*suite(tick, crowd.poses), crowd.front, crowd.rear)
+
+    episode = Episode(max_episode_steps, placements)
+    episode.begin(observe(0))
+    reached, steps, tick = episode.terminated, episode.steps, 0
+    while not (reached | episode.truncated).all():
+        crowd.drive(*np.where(reached, 0.0, drive(episode).T))
         stepped()
-    reached = steps >= 0
+        tick += 1
+        episode.step(observe(tick))
+        steps = np.where(reached, steps, episode.steps)
+        reached = reached | episode.terminated
     bounds = np.array([direct_steps(arena, start) for start in starts])
     return Evaluation(
         placements=placements,
@@ -117,7 +119,7 @@ def measure(
         steps_mean=float(steps[reached].mean()) if reached.any() else None,
         path_ratio=float(steps[reached].sum() / bounds[reached].sum()) if reached.any() else None,
         within_100=float((reached & (steps <= 100)).mean()),
-        cap=cap,
+        max_episode_steps=max_episode_steps,
         seed=seed - SEED_OFFSET,
     )
 
@@ -125,7 +127,8 @@ def measure(
 def describe(found: Evaluation) -> str:
     """An evaluation in words."""
     words = (
-        f"{found.success_rate:.1%} of {found.placements} fresh placements reached the light within {found.cap} steps"
+        f"{found.success_rate:.1%} of {found.placements} fresh placements reached the light "
+        f"within {found.max_episode_steps} steps"
     )
     if found.steps_mean is not None:
         words += f"; {found.steps_mean:.1f} steps on average, {found.path_ratio:.1f} × the direct way"

@@ -71,7 +71,7 @@ def one(options: Options, setup: Any, arena: Any, make: Any) -> tuple[dict[str, 
         kept, fault = options.checkpoint or None, None
         try:
             if kept:
-                loop.agent.learner.prove(arrays)
+                loop.agent.prove(arrays)
                 save(Path(kept), meta, arrays)
         except UserError as error:
             kept, fault = None, error

@@ -143,7 +143,7 @@ class Story(Show):
         if self.found is not None:
             lines += [
                 f"The policy, frozen, reached the light from {self.found['success_rate']:.1%} of {PLACEMENTS} fresh "
-                f"random placements within {self.found['cap']} steps."
+                f"random placements within {self.found['max_episode_steps']} steps."
             ]
             if is_the_papers(load(Path(result["checkpoint"]))[0], self._options, self._fmus):
                 lines.append('The paper reports "upwards of 80%" for this system (section 6.2).')

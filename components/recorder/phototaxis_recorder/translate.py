@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from phototaxis.messages import AgentLog, Episode, SensorsLog, SimLog, World
+from phototaxis.messages import AgentLog, EndedEpisode, SensorsLog, SimLog, World
 from phototaxis.task import ACTIONS, PERCEPTS
 
 from phototaxis_recorder import policy
@@ -20,7 +20,7 @@ from phototaxis_recorder.summary import Summary
 
 PATIENCE = 4000
 """Rows of one role that may wait for another's."""
-WORDS = {"reached": "reached the light", "cap": "gave up", "asked": "was reset"}
+WORDS = {"terminated": "reached the light", "truncated": "gave up", "reset": "was reset"}
 
 
 class Translator:
@@ -36,7 +36,7 @@ class Translator:
         self._mounts = np.array([sonar.position for sonar in world.arena.robot.sonars])
         self._newest = {"sim": -1, "sensors": -1, "agent": -1}
         self._rows: dict[str, list[tuple[Any, ...]]] = {"sim": [], "sensors": [], "agent": []}
-        self._episodes: list[Episode] = []
+        self._episodes: list[EndedEpisode] = []
         self._episode = -1
         self._recent: deque[bool] = deque(maxlen=50)
         self._driver = ""
@@ -134,7 +134,7 @@ class Translator:
             self._at(self._newest["sensors"] + 1)
             rr.log("world/robot/sonar", rr.Clear(recursive=False), recording=self._recording)
         for episode in self._episodes:
-            self._recent.append(episode.end == "reached")
+            self._recent.append(episode.end == "terminated")
             steps = "step" if episode.steps == 1 else "steps"
             self._text(
                 episode.tick,

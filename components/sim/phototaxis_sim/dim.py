@@ -3,7 +3,7 @@
 import numpy as np
 from phototaxis.arena import Arena
 from phototaxis.sight import falloff
-from phototaxis.task import REACHED
+from phototaxis.task import GOAL_LIGHT
 
 _CELLS = 4096
 """Cells of the search for a bright place, at a time."""
@@ -12,13 +12,13 @@ _CELLS = 4096
 def too_dim(arena: Arena) -> str | None:
     """That no light can ever count as reached, in one line; None where one can."""
     noise = arena.sensing.noise
-    brightest = (1 + noise) * _brightest(arena, REACHED / (1 + noise))
-    if brightest > REACHED:
+    brightest = (1 + noise) * _brightest(arena, GOAL_LIGHT / (1 + noise))
+    if brightest > GOAL_LIGHT:
         return None
     index = max(range(len(arena.lights)), key=lambda index: arena.lights[index].brightness)
     return (
         f"lights[{index}].brightness: no sensor can ever read more than {brightest:.3g}, "
-        f"and the light counts as reached above {REACHED}"
+        f"and the light counts as reached above {GOAL_LIGHT}"
     )
 
 

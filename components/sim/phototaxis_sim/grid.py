@@ -10,7 +10,7 @@ import numpy as np
 from phototaxis.arena import Arena
 from phototaxis.sight import LightSensors, Obstacles, falloff
 from phototaxis.solids import distance, extent, solids
-from phototaxis.task import REACHED
+from phototaxis.task import GOAL_LIGHT
 
 _HEADINGS = 12
 _LOOKS = 300
@@ -82,11 +82,11 @@ class Grid:
                     todo.append(other)
 
     def _is_bright(self, number: int) -> bool:
-        """Whether a light sensor could read more than `REACHED` in a region, at some of its cells and headings."""
+        """Whether a light sensor could read more than `GOAL_LIGHT` in a region, at some of its cells and headings."""
         arena = self._arena
         places = (np.argwhere(self._region == number) + 0.5) * self._side
         mounts = np.array(arena.robot.light_sensors).T[:, :, None]
-        most, enough = np.zeros(len(places)), REACHED / (1 + arena.sensing.noise)
+        most, enough = np.zeros(len(places)), GOAL_LIGHT / (1 + arena.sensing.noise)
         for light in arena.lights:
             nearest = np.hypot(*(places - light.position).T) - np.hypot(*mounts).max() - self._side
             most += light.brightness * falloff(arena.sensing, np.maximum(nearest, 0.0))

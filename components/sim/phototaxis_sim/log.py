@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 from phototaxis.machine import Record
-from phototaxis.messages import Episode, SimLog, State
+from phototaxis.messages import EndedEpisode, SimLog, State
 
 
-def row(state: State, ended: tuple[Episode, ...], late: int) -> Record:
+def row(state: State, ended: tuple[EndedEpisode, ...], late: int) -> Record:
     """One tick, with the episodes that ended before it and the ticks so far that had no command in time."""
     contact = state.front + 2 * state.rear
     return Record(

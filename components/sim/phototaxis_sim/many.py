@@ -8,7 +8,7 @@ import numpy as np
 from phototaxis.arena import Arena
 from phototaxis.codec import Refused
 from phototaxis.columns import COUNT, FLAG, pack, unpack
-from phototaxis.messages import ENDS, End, Episode, State, StateOfMany, World
+from phototaxis.messages import ENDS, End, EndedEpisode, State, StateOfMany, World
 
 from phototaxis_sim.crowd import Crowd
 from phototaxis_sim.physics import Physics, Pose
@@ -50,7 +50,7 @@ class SimulationOfMany:
         self.episode, self.tick, self.epoch = np.zeros(robots, int), 0, 0
         self.episodes = self.reached = 0
         self.outcomes: list[bool] = []
-        self.ended: Episode | None = None
+        self.ended: EndedEpisode | None = None
         self._began = 0
         first = [self._placement(row) for row in range(robots)]
         self._start = first[0]
@@ -87,12 +87,12 @@ class SimulationOfMany:
             self._began, self._start = self.tick, Pose(*self.poses[0].tolist())
         return self._report(author)
 
-    def _ending(self, end: End, author: str) -> Episode | None:
+    def _ending(self, end: End, author: str) -> EndedEpisode | None:
         """The first robot's episode, if it ends now."""
         if not end:
             return None
         x, y, heading = self._start
-        return Episode(
+        return EndedEpisode(
             run=self.world.run, episode=int(self.episode[0]), tick=self.tick, steps=self.tick - self._began,
             end=end, driver=author, x=x, y=y, heading=heading,
         )  # fmt: skip
@@ -121,7 +121,7 @@ class SimulationOfMany:
             crowd.drive(motors[0, group], motors[1, group])
         self.tick += 1
         self.epoch += self.world.robots - len(over)
-        self.outcomes = (ends[over] == ENDS.index("reached")).tolist()
+        self.outcomes = (ends[over] == ENDS.index("terminated")).tolist()
         self.episodes += len(over)
         self.reached += sum(self.outcomes)
         self.renew(over)

@@ -2,7 +2,7 @@
 
 from typing import Any, Protocol
 
-from phototaxis.messages import Episode, State, World
+from phototaxis.messages import EndedEpisode, State, World
 
 from phototaxis_sim.simulation import Snapshot
 
@@ -18,7 +18,7 @@ class Simulated(Protocol):
         ...
 
     @property
-    def ended(self) -> Episode | None:
+    def ended(self) -> EndedEpisode | None:
         """The (first robot's) episode that ended in the last `advance`."""
         ...
 

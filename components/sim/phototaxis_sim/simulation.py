@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Struct
 from phototaxis.arena import Arena
 from phototaxis.errors import UserError
-from phototaxis.messages import Command, CommandOfMany, End, Episode, State, World
+from phototaxis.messages import Command, CommandOfMany, End, EndedEpisode, State, World
 
 from phototaxis_sim.physics import Motion, Physics, Pose
 
@@ -51,14 +51,14 @@ class Simulation:
     ----------
     state : State
         the present tick; `driver` is filled in by whoever keeps the seat.
-    ended : Episode or None
+    ended : EndedEpisode or None
         the episode that ended in the last `advance`.
     digest : of the arena.
     """
 
     def __init__(self, arena: Arena, seed: int, run: str, epochs: int = 0, start: Pose | None = None):
         self.world, self.digest = World(run=run, arena=arena, seed=seed, epochs=epochs), arena.digest
-        self.ended: Episode | None = None
+        self.ended: EndedEpisode | None = None
         self.episodes = self.reached = 0
         self._physics = Physics(arena)
         self._period = arena.motion.control_period
@@ -75,7 +75,7 @@ class Simulation:
     @property
     def outcomes(self) -> list[bool]:
         """Whether the light was reached, for each episode that ended in the last `advance`."""
-        return [] if self.ended is None else [self.ended.end == "reached"]
+        return [] if self.ended is None else [self.ended.end == "terminated"]
 
     def check(self, command: Command | CommandOfMany) -> None:
         """No-op: decoding has validated the command of one robot."""
@@ -103,13 +103,13 @@ class Simulation:
         self._tick += 1
         if end:
             x, y, heading = self._start
-            self.ended = Episode(
+            self.ended = EndedEpisode(
                 run=self.world.run, episode=self._episode, tick=self._tick - 1, steps=self._steps, end=end,
                 driver=author, x=x, y=y, heading=heading,
             )  # fmt: skip
             self.episodes += 1
-            self.reached += end == "reached"
-            self._idle = self._idle + 1 if end == "reached" and not self._steps else 0
+            self.reached += end == "terminated"
+            self._idle = self._idle + 1 if end == "terminated" and not self._steps else 0
             if self._idle >= _MOST_IDLE:
                 raise UserError(
                     f"arena {self.world.arena.name}: the light was reached before the first step in the last "

@@ -210,7 +210,7 @@ class Stepper:
         self._refuse_ending()
         if self.steps.simulation.finished:
             raise Refused("the run is finished")
-        self.steps.apply(Entry(0.0, 0.0, self.steps.seat.driver, "asked"))
+        self.steps.apply(Entry(0.0, 0.0, self.steps.seat.driver, "reset"))
 
     def _begin(self, asked: Control) -> None:
         self._refuse_ending()

@@ -3,7 +3,7 @@
 import msgspec
 from phototaxis.codec import Refused
 from phototaxis.machine import Append, Begin, Effect, Flush, Publish, Refusal, Refuse, Say
-from phototaxis.messages import Command, CommandOfMany, Episode, State
+from phototaxis.messages import Command, CommandOfMany, EndedEpisode, State
 from phototaxis.protocol import Question
 from phototaxis.topics import step_topics
 from phototaxis.transitions import Transitions
@@ -43,7 +43,7 @@ class Steps:
         self._state_topic = step_topics(simulation.world.robots).state
         self._keeps = self.snapshot() is not None
         self._driver = ""
-        self._ended: tuple[Episode, ...] = ()
+        self._ended: tuple[EndedEpisode, ...] = ()
         self._recorded = ("", -1)
 
     @property

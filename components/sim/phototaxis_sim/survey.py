@@ -7,7 +7,7 @@ from phototaxis.arena import Arena
 from phototaxis.errors import UserError
 from phototaxis.sight import LightSensors, Obstacles
 from phototaxis.solids import extent, solids
-from phototaxis.task import REACHED
+from phototaxis.task import GOAL_LIGHT
 
 from phototaxis_sim.grid import Grid
 from phototaxis_sim.physics import Physics, Pose
@@ -44,7 +44,7 @@ def survey(arena: Arena) -> list[str]:
 def _lit(arena: Arena, poses: np.ndarray) -> np.ndarray:
     """Whether the light counts as reached at poses (N, 3), whatever the noise is; (N,) bool."""
     light, noise = LightSensors(arena, Obstacles(arena))(poses).max(axis=0), arena.sensing.noise
-    return (light > REACHED) & (light * (1 - noise) >= REACHED)  # the least noise of all has probability 0
+    return (light > GOAL_LIGHT) & (light * (1 - noise) >= GOAL_LIGHT)  # the least noise of all has probability 0
 
 
 def _outside(arena: Arena) -> Iterator[str]:
@@ -70,4 +70,4 @@ def _cut_off(arena: Arena, starts: list[Pose]) -> list[str]:
     if not lost:
         return []
     whence = "any placement" if lost == len(starts) else f"{lost / len(starts):.0%} of the placements"
-    return [f"lights: from {whence} there seems to be no way to where a light sensor would read more than {REACHED}"]
+    return [f"lights: from {whence} there seems to be no way to where a light sensor would read more than {GOAL_LIGHT}"]

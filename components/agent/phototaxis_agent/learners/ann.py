@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import torch
-from phototaxis.task import ACTIONS, Percept, State
+from phototaxis.task import MOTORS, Percept, PerceptState
 
 from phototaxis_agent.inputs import Scaled
 from phototaxis_agent.learner import Learner, Transition
@@ -26,7 +26,7 @@ class Ann(Learner):
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options, self._percept, self._scaled = options, percept, Scaled(percept)
-        motors = (np.array(ACTIONS) + 1) / 2
+        motors = (MOTORS + 1) / 2
         self._motors, self._allowed = motors, motors[list(percept.actions)]
         width = self._scaled.width + len(self.context)
         self._net = Perceptron(options, width + 2, rng, linear=self.linear)
@@ -44,7 +44,7 @@ class Ann(Learner):
         pairs = self._pairs(np.repeat(states, actions, axis=0), np.tile(self._allowed, (count, 1)))
         return self._net.output(self._net.hidden(pairs)).numpy().reshape(count, actions)
 
-    def values(self, state: State) -> list[float]:
+    def values(self, state: PerceptState) -> list[float]:
         return self.values_of(np.array([state], dtype=float))[0].tolist()
 
     @one_thread

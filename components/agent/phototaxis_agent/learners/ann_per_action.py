@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import torch
-from phototaxis.task import ACTIONS, Percept, State
+from phototaxis.task import ACTIONS, Percept, PerceptState
 
 from phototaxis_agent.inputs import Scaled
 from phototaxis_agent.learner import Learner, Transition
@@ -31,7 +31,7 @@ class AnnPerAction(Learner):
     def values_of(self, states: np.ndarray) -> np.ndarray:
         return self._net.output(self._hidden(states)).numpy()[self._allowed].T
 
-    def values(self, state: State) -> list[float]:
+    def values(self, state: PerceptState) -> list[float]:
         return self.values_of(np.array([state], dtype=float))[0].tolist()
 
     @one_thread

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import torch
 from msgspec import Meta, Struct
-from phototaxis.task import ACTIONS, MIRRORED, Percept, State
+from phototaxis.task import ACTIONS, MIRRORED, Percept, PerceptState
 
 from phototaxis_agent import context
 from phototaxis_agent.inputs import OneHot
@@ -42,7 +42,7 @@ class Dqn(Learner):
 
     Options = Hyperparameters
     presets: ClassVar[dict[str, dict[str, Any]]] = {
-        "": {"reward": "potential", "hot": 0.5, "cold": 0.1, "cooling": 0.6, "cap": 50},
+        "": {"reward": "potential", "hot": 0.5, "cold": 0.1, "cooling": 0.6, "max_episode_steps": 50},
         "continuous": {"cooling": 0.8, "batch": 24},
     }
     context: tuple[float, ...] = context.BLANK
@@ -75,7 +75,7 @@ class Dqn(Learner):
         with torch.no_grad():
             return self._net(self._encode(states)).numpy()[:, self._allowed]
 
-    def values(self, state: State) -> list[float]:
+    def values(self, state: PerceptState) -> list[float]:
         return self.values_of(np.array([state], dtype=float))[0].tolist()
 
     @one_thread

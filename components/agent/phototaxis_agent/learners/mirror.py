@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
-from phototaxis.task import ACTIONS, MIRRORED, Percept, State
+from phototaxis.task import ACTIONS, MIRRORED, Percept, PerceptState
 
 from phototaxis_agent import context
 from phototaxis_agent.learner import Learner, Transition, discrete, stored, stored_rows
@@ -43,15 +43,15 @@ class Mirror(Learner):
 
     Options = Hyperparameters
     presets: ClassVar[dict[str, dict[str, Any]]] = {
-        "": {"reward": "potential", "hot": 0.12, "cold": 0.06, "cooling": 0.6, "cap": 200},
-        "rich": {"cap": 100, "cold": 0.1, "start": 1.0, "ridge": 1.0},
+        "": {"reward": "potential", "hot": 0.12, "cold": 0.06, "cooling": 0.6, "max_episode_steps": 200},
+        "rich": {"max_episode_steps": 100, "cold": 0.1, "start": 1.0, "ridge": 1.0},
     }
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options, self._percept, self._allowed = options, discrete(percept), list(percept.actions)
         if options.memory == "last":
             self.context = context.BLANK
-        self._entries: dict[State, list[int]] = {}
+        self._entries: dict[PerceptState, list[int]] = {}
         self._met: list[tuple[float, ...]] = []
         self._table = np.array([options.start])
         """Entry 0 stands for everything that was not tried yet."""
@@ -64,7 +64,7 @@ class Mirror(Learner):
     def remember(self, state: Any, action: Any, gain: Any) -> tuple[Any, ...]:
         return context.remember(action, gain) if self.context else ()
 
-    def values(self, state: State) -> list[float]:
+    def values(self, state: PerceptState) -> list[float]:
         table, entries = self._table, self._entries.get(state, _UNKNOWN)
         return [float(table[entries[action]]) for action in self._allowed]
 
@@ -103,12 +103,12 @@ class Mirror(Learner):
         spread -= np.multiply.outer(gain, slope)
         return float(error)
 
-    def _best(self, state: State) -> int:
+    def _best(self, state: PerceptState) -> int:
         """The entry of the best allowed action."""
         entries = self._entries.get(state, _UNKNOWN)
         return max((entries[action] for action in self._allowed), key=self._table.__getitem__)
 
-    def _entry(self, state: State, action: int) -> int:
+    def _entry(self, state: PerceptState, action: int) -> int:
         """The entry of an action in a state, also that of their mirror image; made when it is first asked for."""
         entries = self._entries.setdefault(state, [0] * len(ACTIONS))
         if not entries[action]:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta, Struct
-from phototaxis.task import ACTIONS, Percept, State
+from phototaxis.task import ACTIONS, Percept, PerceptState
 
 from phototaxis_agent.learner import Learner, Transition, discrete, falling, stored
 
@@ -28,14 +28,14 @@ class QTable(Learner):
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options = options
-        self._index: dict[State, int] = {
+        self._index: dict[PerceptState, int] = {
             state: i for i, state in enumerate(product(*map(range, discrete(percept).sizes)))
         }
         self._allowed = percept.actions
         shape = len(self._index), len(ACTIONS)
         self._table: list[list[float]] = rng.uniform(-0.15, 0.15, shape).tolist()  # section 5.1, step 1
 
-    def values(self, state: State) -> list[float]:
+    def values(self, state: PerceptState) -> list[float]:
         row = self._table[self._index[state]]
         return [row[action] for action in self._allowed]
 

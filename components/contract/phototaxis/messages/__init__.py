@@ -9,7 +9,7 @@ from phototaxis.messages.base import ENDS, MAX_ROBOTS, SCHEMA, Count, End, Messa
 from phototaxis.messages.control import Control, ControlReply
 from phototaxis.messages.logs import AgentLog, Log, LogRequest, SensorsLog, SimLog
 from phototaxis.messages.many import CommandOfMany, ReadingsOfMany, StateOfMany
-from phototaxis.messages.run import Episode, How, Phase, Recorded, Seating, Status, World, run_name
+from phototaxis.messages.run import EndedEpisode, How, Phase, Recorded, Seating, Status, World, run_name
 from phototaxis.messages.step import Command, Readings, State
 
 __all__ = [
@@ -25,7 +25,7 @@ __all__ = [
     "ControlReply",
     "Count",
     "End",
-    "Episode",
+    "EndedEpisode",
     "How",
     "Launch",
     "LaunchReply",

@@ -19,9 +19,9 @@ Count = Annotated[int, Meta(ge=0, le=2**53)]
 Seed = Count
 """A seed of random numbers."""
 
-End = Literal["", "reached", "cap", "asked"]
-"""How an episode ends: "" while it goes on, at the light (terminated), at the step cap (truncated), by request."""
-ENDS: tuple[End, ...] = ("", "reached", "cap", "asked")
+End = Literal["", "terminated", "truncated", "reset"]
+"""How an episode ends: "" while it goes on, at the light, after its full number of steps, or by request."""
+ENDS: tuple[End, ...] = ("", "terminated", "truncated", "reset")
 """The ends by the numbers that `CommandOfMany` has for them."""
 
 

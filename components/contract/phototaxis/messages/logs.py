@@ -5,7 +5,7 @@ from typing import Annotated
 from msgspec import Meta, field
 
 from phototaxis.messages.base import Count, Message, Name
-from phototaxis.messages.run import Episode
+from phototaxis.messages.run import EndedEpisode
 
 Column = list[float]
 """One real number for each tick."""
@@ -61,7 +61,7 @@ class SimLog(Log, kw_only=True):
     """Command of the right wheel that led to each tick, from −1 to 1 of full speed."""
     contact: list[int]
     """Which half of the body touched something before each tick: 0 none, 1 the front, 2 the rear, 3 both."""
-    ended: list[Episode]
+    ended: list[EndedEpisode]
     """The episodes that ended since the chunk before."""
 
     def __post_init__(self) -> None:

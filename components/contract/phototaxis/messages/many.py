@@ -69,7 +69,7 @@ class CommandOfMany(Message, kw_only=True):
     author: Name
     """Name of the agent that gives the commands; the simulation ignores everyone but the driver."""
     end: bytes
-    """Array (N,) of uint8: 0 to drive on, 1 for reached, 2 for cap, 3 for asked; an ended robot is placed anew."""
+    """Array (N,) of uint8: 0 to drive on; 1 terminated, 2 truncated, 3 reset to end the episode and begin another."""
     left: bytes
     """Array (N,) of float64: command of each left wheel for one control period, from −1 to 1 of full speed."""
     right: bytes

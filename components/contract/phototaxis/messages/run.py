@@ -35,7 +35,7 @@ class World(Message, kw_only=True):
     """The room, its obstacles and lights, the robot's geometry and the laws of its sensors."""
 
 
-class Episode(Message, kw_only=True):
+class EndedEpisode(Message, kw_only=True):
     """One episode, published when it has ended. With several robots it is the first robot's."""
 
     run: Name
@@ -47,7 +47,7 @@ class Episode(Message, kw_only=True):
     steps: Count
     """Number of motor commands that were applied during the episode."""
     end: End
-    """How the episode ended: at the light, at the step cap, or by request."""
+    """How the episode ended: at the light, after its full number of steps, or by request."""
     driver: Name
     """Name of the agent that drove when the episode ended."""
     x: float

@@ -12,7 +12,7 @@ from phototaxis_sim import arenas
 
 from phototaxis_lab.cell import PLACEMENTS, Cell, Outcome, System, learn
 from phototaxis_lab.controllers import Braitenberg, Random
-from phototaxis_lab.measure import Evaluation, Policy, measure
+from phototaxis_lab.measure import Drive, Evaluation, measure
 from phototaxis_lab.reproduction import figures
 from phototaxis_lab.reproduction.claims import CLAIMS, Data, between, state_shares
 from phototaxis_lab.reproduction.plan import (
@@ -59,7 +59,7 @@ def write(folder: Path, data: Data, fresh: Fresh, seeds: range) -> None:
 def controllers(name: str, seeds: range) -> dict[str, list[Evaluation]]:
     """What learns nothing, measured like the learners: on the same placements."""
     arena = arenas.load(name)
-    kinds: dict[str, Callable[[int], Policy]] = {
+    kinds: dict[str, Callable[[int], Drive]] = {
         "random, 9 actions": lambda seed: Random(range(9), seed),
         "random, 6 forward actions": lambda seed: Random(FORWARD, seed),
         "Braitenberg, hand-written": lambda _: Braitenberg(arena.sensing.near),
@@ -154,10 +154,11 @@ def hyperparameters() -> str:
     for system, _ in WHOLE.values():
         setup = system.setup()
         options = msgspec.to_builtins(setup.hyperparameters) | msgspec.to_builtins(setup.exploration)
+        options["max_episode_steps"] = setup.task.max_episode_steps
         words = ", ".join(
             f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}" for name, value in options.items()
         )
-        row = f"| {setup.learner}, {setup.task.percept}, {setup.task.scheme().scheme} | {words}, cap {setup.task.cap} |"
+        row = f"| {setup.learner}, {setup.task.percept}, {setup.task.scheme().scheme} | {words} |"
         if row not in seen:
             seen.add(row)
             rows.append(row)
