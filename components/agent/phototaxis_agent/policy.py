@@ -1,7 +1,7 @@
 """What decides and learns, for one robot or for many that share it."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Any
 
@@ -154,7 +154,7 @@ class Policy:
         self.epoch, self.budget = meta.epoch, max(meta.budget, self.budget)
 
     @contextmanager
-    def _aside(self) -> Iterator[None]:
+    def _aside(self) -> Generator[None]:
         """Ask the learner something without an influence on the run: what it draws meanwhile is drawn again."""
         drawn = self._rng.bit_generator.state
         yield

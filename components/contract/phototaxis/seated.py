@@ -57,7 +57,8 @@ class SeatedAgent:
         """Answer one tick."""
         episode = self.episode
         episode.follow(readings)
-        end = ENDS[episode.end]
+        number: int = episode.end
+        end = ENDS[number]
         self.last, (left, right) = self.decide(readings, end != "")
         self.command = Command(
             run=readings.run, tick=readings.tick, author=self.author, left=left, right=right, end=end

@@ -33,9 +33,10 @@ def _first_of_one(cases: Cases, otherwise: Any) -> Any:
 
 
 def _first_of_each(cases: Cases, otherwise: Any) -> Any:
+    found: np.ndarray = np.asarray(otherwise)
     for holds, value in reversed(cases):
-        otherwise = np.where(holds, value, otherwise)
-    return otherwise
+        found = np.where(holds, value, found)
+    return found
 
 
 def _largest_of_each(*values: Any) -> Any:
