@@ -6,15 +6,15 @@ import tempfile
 import time
 from pathlib import Path
 
-from phototaxis.arena import Arena
-from phototaxis.fmu import FmuOptions
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.fmu import FmuOptions
 from phototaxis_agent.setup import make_setup
 from phototaxis_fmu.build import build
 from phototaxis_fmu.examples import EXAMPLES
 from phototaxis_lab.loop import train
 from phototaxis_lab.measure import evaluate
-from phototaxis_sensors.choice import choose
-from phototaxis_sensors.model import Past
+from phototaxis_sensors.choice import choose_sensors
+from phototaxis_sensors.model import PastMoment
 from phototaxis_sensors.scene import Scene
 
 TICKS = 5000
@@ -42,12 +42,12 @@ def costs(arena: Arena, folder: Path) -> dict[str, float]:
 def _cost(arena: Arena, options: FmuOptions) -> float:
     places = [(1 + 8 * (i * 0.618 % 1), 1 + 8 * (i * 0.414 % 1), i * 0.1) for i in range(TICKS)]
     rounds = []
-    with choose(options, one_cpu=True) as make:
+    with choose_sensors(options, one_cpu=True) as make:
         light = make(arena, Scene(arena)).light
         for number in range(5):
             began = time.perf_counter()
             for tick, place in enumerate(places, number * TICKS):
-                light(Past(tick, tick // 50, *place))
+                light(PastMoment(tick, tick // 50, *place))
             rounds.append((time.perf_counter() - began) / TICKS * 1e6)
     return statistics.median(rounds)
 
@@ -72,7 +72,7 @@ def _sensors(folder: Path) -> dict[str, FmuOptions]:
 
 
 def _success(arena: Arena, learner: str, options: FmuOptions, seed: int) -> float:
-    with choose(options) as sensors:
+    with choose_sensors(options) as sensors:
         loop, _ = train(make_setup(learner), arena, seed, EPOCHS, sensors)
         loop.agent.policy.learning = False
         return evaluate(arena, loop.agent.policy, 200, seed, sensors=sensors).success_rate

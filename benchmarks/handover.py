@@ -12,10 +12,10 @@ from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from typing import Any
 
-from phototaxis.bus import Bus
-from phototaxis.codec import Decoder
-from phototaxis.messages import State, Status
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.codec import Decoder
+from phototaxis.wire.messages import State, Status
 
 DEADLINE = 30.0
 

@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 import zenoh
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.session import BusOptions, open_session
 from zenoh.handlers import Callback
 
 SIZES = {"state": 213, "readings": 281, "command": 73}

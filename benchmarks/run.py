@@ -21,13 +21,13 @@ import fmu
 import handover
 import msgspec
 import numpy as np
-from phototaxis.arena import Arena, Disc, Light
-from phototaxis.codec import Decoder, encode
-from phototaxis.messages import Command, Message, Readings, State, World
-from phototaxis.ports import free_ports
+from phototaxis.geometry.arena import Arena, Disc, Light
+from phototaxis.runtime.ports import free_ports
 from phototaxis.task import PERCEPTS
-from phototaxis_agent.crowd import CrowdAgent
-from phototaxis_agent.learner import Transition, available
+from phototaxis.wire.codec import Decoder, encode
+from phototaxis.wire.messages import Command, Message, Readings, State, World
+from phototaxis_agent.batch_agent import BatchAgent
+from phototaxis_agent.learner import Transition, available_learners
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab.cell import Cell, System
 from phototaxis_lab.grid import summary
@@ -84,7 +84,7 @@ def main() -> None:
         print(f"  {name:25} {rate:9,.0f} {own:9.1f}")
 
     print("\nMany robots in one process (evaluations), robot steps/s: physics, sensors, percept, a table's draws")
-    for count, rate in crowds(paper):
+    for count, rate in batches(paper):
         print(f"  {count:5} robots {rate:12,.0f}")
 
     environments.report()
@@ -101,7 +101,9 @@ def main() -> None:
 def learners(arena: Arena) -> list[tuple[str, float, float]]:
     """Each learner with each percept that suits it: training steps/s, and µs of one `values` and one `learn`."""
     rows = []
-    every = [(name, percept) for name in available() for percept in ("simple", "rich")] + [("dqn", "continuous")]
+    every = [(name, percept) for name in available_learners() for percept in ("simple", "rich")] + [
+        ("dqn", "continuous")
+    ]
     for name, percept in every:
         setup = make_setup(name, percept=percept)
         rate = statistics.median(1000 / train(setup, arena, number, 1000)[1] for number in range(ROUNDS))
@@ -113,7 +115,7 @@ def learners(arena: Arena) -> list[tuple[str, float, float]]:
     return rows
 
 
-def crowds(arena: Arena) -> list[tuple[int, float]]:
+def batches(arena: Arena) -> list[tuple[int, float]]:
     """Robot steps/s of evaluations with different numbers of robots."""
     policy = SETUP.agent(World(run="bench", arena=arena, seed=1, epochs=0), learning=False).policy
     rows = []
@@ -122,7 +124,7 @@ def crowds(arena: Arena) -> list[tuple[int, float]]:
         for number in range(ROUNDS):
             began = time.perf_counter()
             found = measure(
-                arena, CrowdAgent(policy, arena.sensing.near, count, number), count, number, max_episode_steps=30
+                arena, BatchAgent(policy, arena.sensing.near, count, number), count, number, max_episode_steps=30
             )
             rates.append(30 * found.placements / (time.perf_counter() - began))
         rows.append((count, statistics.median(rates)))
@@ -236,13 +238,13 @@ def taking_turns() -> float:
 
 def recorder_cost(arena: Arena, loop: Loop) -> float:
     """µs a tick to turn log chunks into Rerun columns on disk."""
-    from phototaxis.messages import AgentLog, SensorsLog, SimLog
-    from phototaxis_recorder.sinks import Recording
+    from phototaxis.wire.messages import AgentLog, SensorsLog, SimLog
+    from phototaxis_recorder.sinks import RecordingSinks
 
     ticks, chunk, began = 8000, 16, 0.0
     with tempfile.TemporaryDirectory() as folder:
         world = World(run="bench", arena=arena, seed=1, epochs=0)
-        recording = Recording(world, Path(folder) / "b.rrd", "127.0.0.1", free_ports(1)[0], "64MiB")
+        recording = RecordingSinks(world, Path(folder) / "b.rrd", "127.0.0.1", free_ports(1)[0], "64MiB")
         translator = recording.translator
         began = time.perf_counter()
         for first in range(0, ticks, chunk):

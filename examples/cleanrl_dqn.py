@@ -34,9 +34,9 @@ class Options:
     """its name"""
     gamma: float = 0.6
     """discount"""
-    rate: float = 1e-3
+    learning_rate: float = 1e-3
     """learning rate of Adam"""
-    batch: int = 128
+    batch_size: int = 128
     """transitions in one update"""
     start: int = 500
     """robot steps before the first update"""
@@ -76,7 +76,7 @@ def train(options: Options) -> nn.Module:
     inputs, actions = robots.single_observation_space.shape[0], robots.single_action_space.n
     net, target = network(inputs, actions), network(inputs, actions)
     target.load_state_dict(net.state_dict())
-    adam = torch.optim.Adam(net.parameters(), options.rate)
+    adam = torch.optim.Adam(net.parameters(), options.learning_rate)
     memory: list[tuple] = []
     seen, _ = robots.reset(seed=options.seed)
     over, updates = np.zeros(options.robots, bool), 0
@@ -95,7 +95,7 @@ def train(options: Options) -> nn.Module:
         if len(memory) < options.start:
             continue
         for _ in range(2):
-            columns = zip(*random.sample(memory, options.batch), strict=True)
+            columns = zip(*random.sample(memory, options.batch_size), strict=True)
             s, a, r, n, t = (torch.tensor(np.array(column)) for column in columns)
             with torch.no_grad():
                 best = net(n).argmax(1, keepdim=True)

@@ -4,8 +4,8 @@ import signal
 
 import pytest
 from fmus import fmu as fmu
-from phototaxis.arena import Arena
-from phototaxis_agent.setup import Setup, make_setup
+from phototaxis.geometry.arena import Arena
+from phototaxis_agent.setup import AgentSetup, make_setup
 from phototaxis_sim import arenas
 
 # Started in the background of a script, the tests inherit an ignored SIGINT, and so would what they interrupt.
@@ -19,6 +19,6 @@ def paper() -> Arena:
 
 
 @pytest.fixture
-def setup() -> Setup:
+def setup() -> AgentSetup:
     """The default agent: Q-table, simple percept."""
     return make_setup()

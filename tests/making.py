@@ -1,12 +1,16 @@
 """Values that many tests make."""
 
-from phototaxis.messages import Readings
-from phototaxis_agent.learner import available
+from phototaxis.wire.messages import Readings
+from phototaxis_agent.learner import available_learners
 
 
 def own_learners() -> list[str]:
     """Names of the learners that come with this project, whatever else is installed."""
-    return [name for name, point in available().items() if point.dist is not None and point.dist.name == "phototaxis"]
+    return [
+        name
+        for name, point in available_learners().items()
+        if point.dist is not None and point.dist.name == "phototaxis"
+    ]
 
 
 def readings(tick: int = 0, light: tuple[float, float] = (0.1, 0.1), **changes) -> Readings:

@@ -6,7 +6,7 @@ from enum import StrEnum
 from typing import Any
 
 import pytest
-from phototaxis.transitions import Transitions
+from phototaxis.runtime.transitions import Transitions
 
 Row = tuple[StrEnum, StrEnum]
 

@@ -5,15 +5,15 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta, Struct
 from phototaxis.task import ACTIONS, Percept, PerceptState
-from phototaxis_agent.learner import Learner, Transition, discrete, falling, stored
+from phototaxis_agent.learner import Learner, Transition, annealed, discrete, stored
 
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
     """Of the two tables."""
 
-    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.16
-    """learning rate at the first epoch; it falls geometrically to `alpha_end`"""
-    alpha_end: Annotated[float, Meta(gt=0, le=1)] = 0.01
+    learning_rate: Annotated[float, Meta(gt=0, le=1)] = 0.16
+    """learning rate at the first epoch; it falls geometrically to `learning_rate_end`"""
+    learning_rate_end: Annotated[float, Meta(gt=0, le=1)] = 0.01
     """learning rate at the end"""
     gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.75
     """discount factor"""
@@ -35,11 +35,13 @@ class DoubleQ(Learner):
     def learn(self, transition: Transition) -> float:
         chosen = int(self._rng.integers(2))
         here = (chosen, *map(int, transition.state), transition.action)
-        following = self._tables[(slice(None), *map(int, transition.following))]
+        following = self._tables[(slice(None), *map(int, transition.next_state))]
         best = max(self._allowed, key=lambda action: following[chosen, action])
         value = 0.0 if transition.terminated else self._options.gamma * following[1 - chosen, best]
         error = transition.reward + value - self._tables[here]
-        self._tables[here] += falling(self._options.alpha, self._options.alpha_end, transition.progress) * error
+        self._tables[here] += (
+            annealed(self._options.learning_rate, self._options.learning_rate_end, transition.progress) * error
+        )
         return float(error)
 
     def save(self) -> dict[str, np.ndarray]:

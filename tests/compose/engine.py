@@ -10,10 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from phototaxis.bus import Bus
-from phototaxis.messages import Status
-from phototaxis.ports import free_ports
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.ports import free_ports
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.messages import Status
 
 DEADLINE = 60.0
 DOCKER = shutil.which("docker") or "docker"

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from engine import DEADLINE, System, docker
 from fmus import Built
-from phototaxis.errors import Unavailable
-from phototaxis.messages import LogRequest, Status
-from phototaxis.roles import COMPONENTS
+from phototaxis.runtime.errors import Unavailable
+from phototaxis.runtime.roles import COMPONENTS
+from phototaxis.wire.messages import LogRequest, Status
 from rerun_files import RERUN, newest_tick
 
 SERVICES = ("router", *COMPONENTS)

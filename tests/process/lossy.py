@@ -10,8 +10,8 @@ import sys
 from importlib import import_module
 from unittest.mock import patch
 
-from phototaxis.bus import Bus
-from phototaxis.topics import TOPICS
+from phototaxis.runtime.bus import Bus
+from phototaxis.wire.topics import TOPICS
 
 module, share, options = sys.argv[1], float(sys.argv[2]), sys.argv[3:]
 chance = random.Random(module)

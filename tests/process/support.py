@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-from phototaxis.bus import Bus
-from phototaxis.machine import Event
-from phototaxis.messages import Status
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.machine import Event
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.messages import Status
 
 DEADLINE = 60.0
 

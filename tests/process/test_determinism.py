@@ -84,7 +84,7 @@ def test_lost_and_doubled_messages_change_nothing(start, alone, world, tmp_path)
     assert status.refused["command: late or repeated"] > 10  # doubled and repeated answers did arrive
     found = json.loads(phototaxis("evaluate", checkpoint, "--placements", 20, "--json").stdout)
     assert found["placements"] == 20
-    from phototaxis.checkpoint import load
+    from phototaxis.runtime.checkpoint import load
 
     assert {"state_hash": status.hash, "learner_hash": load(checkpoint)[0].learner_hash} == alone
 

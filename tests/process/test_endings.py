@@ -12,8 +12,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-from phototaxis.checkpoint import load
-from phototaxis.ports import free_ports
+from phototaxis.runtime.checkpoint import load
+from phototaxis.runtime.ports import free_ports
 from support import DEADLINE, command, observer, phototaxis, result, wait_status
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from phototaxis.errors import Unavailable
-from phototaxis.journal import GIVEN_UP, Journal
+from phototaxis.runtime.errors import Unavailable
+from phototaxis.runtime.journal import GIVEN_UP, Journal
 from phototaxis_launcher.child import Child
 from phototaxis_sim import arenas
 from phototaxis_sim.simulation import Simulation

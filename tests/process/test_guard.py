@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 import zenoh
-from phototaxis.bus import Bus
-from phototaxis.checkpoint import load
-from phototaxis.errors import UserError
-from phototaxis.ports import free_ports
-from phototaxis.router import client_config, router_config
-from phototaxis.session import BusOptions, open_session
+from phototaxis.guard.router import client_config, router_config
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.checkpoint import load
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.ports import free_ports
+from phototaxis.runtime.session import BusOptions, open_session
 from phototaxis_lab import check
 from phototaxis_launcher import certs as certs_command
 from support import Process, command, phototaxis, wait_status
@@ -142,7 +142,7 @@ def test_an_agent_with_good_credentials_can_do_what_an_agent_does_and_no_more(gu
 def test_the_shipped_configuration_and_page_are_those_of_the_tables(tmp_path):
     done = phototaxis("check", "rights")
     assert done.returncode == 0, done.stderr
-    assert "| agent | command, crowd/command, log/agent | readings, crowd/readings |" in done.stdout
+    assert "| agent | command, batch/command, log/agent | readings, batch/readings |" in done.stdout
     assert phototaxis("check", "wire").returncode == 0
     file = tmp_path / "router.json5"
     assert phototaxis("check", "rights", "--file", file, "--worlds", "a,b", "--write").returncode == 0

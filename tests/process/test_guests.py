@@ -7,11 +7,11 @@ import time
 from pathlib import Path
 
 import pytest
-from phototaxis.bus import Bus
-from phototaxis.checkpoint import load
-from phototaxis.messages import Command, Control, Readings
-from phototaxis.ports import free_ports
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.checkpoint import load
+from phototaxis.runtime.ports import free_ports
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.messages import Command, Control, Readings
 from support import Process, observer, phototaxis, wait_status
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -92,7 +92,7 @@ def test_an_agent_that_breaks_the_contract_is_told_where(start, world):
 
 
 def test_without_an_agent_the_check_says_so(world):
-    done = phototaxis("check", "agent", "--name", world, "--patience", 0.2)
+    done = phototaxis("check", "agent", "--name", world, "--agent-timeout", 0.2)
     assert done.returncode == 3
     assert "liveliness token" in done.stderr
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from gymnasium.error import ClosedEnvironmentError, Error, InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
-from phototaxis.ports import free_ports
+from phototaxis.runtime.ports import free_ports
 from rerun_files import series
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 from support import Process, observer, phototaxis, wait_alive, wait_status

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from phototaxis.bus import Bus
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.session import BusOptions, open_session
 from phototaxis_sensors.suite import SensorSuite
 from support import children, observer, phototaxis, result, wait, wait_status
 
@@ -155,7 +155,7 @@ def test_sensors_that_are_always_a_tick_late_are_named(start, world):
 
 def test_a_thread_that_a_learner_leaves_behind_does_not_keep_the_program():
     thread = "threading.Thread(target=time.sleep, args=[1e5]).start()"
-    code = f"import threading, time; from phototaxis.errors import leave; {thread}; leave(3)"
+    code = f"import threading, time; from phototaxis.runtime.errors import leave; {thread}; leave(3)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 3
     assert "a learner's threads should be daemons" in done.stderr

@@ -27,7 +27,10 @@ PORT = "an endpoint is like tcp/127.0.0.1:7447"
             "up --epochs 10 --arena papr",
             "sim: no arena 'papr': neither a file nor one that is shipped; did you mean paper?",
         ),
-        ("up --learner mirror --alpha 0.1", "no option --alpha (see phototaxis agent --learner mirror --help)"),
+        (
+            "up --learner mirror --learning-rate 0.1",
+            "no option --learning-rate (see phototaxis agent --learner mirror --help)",
+        ),
         ("up --resume nothing.npz", "error: nothing.npz: no such checkpoint"),
         ("swap mirror --checkpoint c.npz", "--checkpoint is for an agent that is started alone"),
         ("agent --worlds a/b", "--worlds a/b: expected names with commas between them, each up to 40 letters"),

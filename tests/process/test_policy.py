@@ -13,8 +13,8 @@ from typing import Any
 
 import gymnasium
 import pytest
-from phototaxis.messages import World
-from phototaxis_gym.policy import Policy, PolicyAgent
+from phototaxis.wire.messages import World
+from phototaxis_gym.policy import FrozenPolicy, PolicyAgent
 from phototaxis_gym.policy_file import load
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim import arenas
@@ -118,7 +118,7 @@ def test_any_percept_and_action_of_the_environment_can_be_seated(kind, percept, 
     model = load(tmp_path / "p.zip", trusted=True)
     assert isinstance(model, kind)
     world = World(run="r", arena=arenas.load("paper"), seed=0, epochs=0)
-    agent = PolicyAgent(Policy(model, tmp_path / "p.zip", world.arena), 50)
+    agent = PolicyAgent(FrozenPolicy(model, tmp_path / "p.zip", world.arena), 50)
     simulation = Simulation(world.arena, 0, "r")
     suite = SensorSuite(simulation.world)
     seen, _ = environment.reset(seed=0)

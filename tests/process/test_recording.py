@@ -8,7 +8,7 @@ import subprocess
 import urllib.request
 from pathlib import Path
 
-from phototaxis.ports import free_ports
+from phototaxis.runtime.ports import free_ports
 from rerun_files import RERUN, newest_tick, salvaged, series
 from support import children, observer, phototaxis, result, wait, wait_alive, wait_status
 

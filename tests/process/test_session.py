@@ -5,10 +5,10 @@ import time
 
 import pytest
 import zenoh
-from phototaxis.bus import Bus
-from phototaxis.checkpoint import load
-from phototaxis.ports import free_ports
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.checkpoint import load
+from phototaxis.runtime.ports import free_ports
+from phototaxis.runtime.session import BusOptions, open_session
 from support import DEADLINE, phototaxis, wait_status
 
 

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import zenoh
-from phototaxis.ports import free_ports
+from phototaxis.runtime.ports import free_ports
 
 STRANGER = """
 import sys, time, zenoh
@@ -26,8 +26,8 @@ WORLDS = """
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from phototaxis.bus import Bus
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.session import BusOptions, open_session
 with ExitStack() as stack:
     for file in sys.argv[1:]:
         world = Path(file).stem

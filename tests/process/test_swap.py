@@ -6,9 +6,9 @@ import signal
 
 import psutil
 import pytest
-from phototaxis.bus import Bus
-from phototaxis.messages import Command, Control
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.messages import Command, Control
 from support import DEADLINE, Process, observer, phototaxis, result, wait, wait_status
 
 EPOCHS = 3000
@@ -72,13 +72,16 @@ def test_swap_is_one_command(up, world):
     launcher = up("--epochs", 0, "--speed", 100, "--no-recorder", "--learner", "ann")
     with observer(world) as bus:
         wait_status(bus, lambda status: status.tick > 10, launcher)
-        done = phototaxis("swap", "qtable", "--alpha", 0.5, "--name", world, "--json")
+        done = phototaxis("swap", "qtable", "--learning-rate", 0.5, "--name", world, "--json")
         assert done.returncode == 0, done.stderr
         swapped = json.loads(done.stdout)
         status = wait_status(bus, lambda status: status.driver == swapped["agent"], launcher)
         assert status.drivers[-1].tick == swapped["from_tick"]
         wait_status(bus, lambda status: not any("/ann-" in who for who in status.alive), launcher)  # the old one left
-        for words, line in ((["magic"], "no learner 'magic'; there are:"), (["qtable", "--alpha", 9], "--alpha 9")):
+        for words, line in (
+            (["magic"], "no learner 'magic'; there are:"),
+            (["qtable", "--learning-rate", 9], "--learning-rate 9"),
+        ):
             wrong = phototaxis("swap", *words, "--name", world)
             assert wrong.returncode == 2
             assert line in wrong.stderr
@@ -120,7 +123,7 @@ def finish(bus: Bus, standby: Process, others: tuple[Process, ...], tmp_path) ->
     status = wait_status(bus, lambda status: status.phase == "finished", standby, *others)
     assert [one.driver for one in status.drivers] == ["driver", "heir"]
     assert standby.stop() == 0
-    from phototaxis.checkpoint import load
+    from phototaxis.runtime.checkpoint import load
 
     return {"state_hash": status.hash, "learner_hash": load(tmp_path / "heir.npz")[0].learner_hash}
 
@@ -160,7 +163,7 @@ def test_a_frozen_driver_loses_the_seat_and_its_late_command_does_not_count(team
 
 
 def test_a_driver_that_hangs_with_its_token_on_the_bus_loses_the_seat(start, world):
-    sim = start("sim", "--name", world, "--patience", 0.5)
+    sim = start("sim", "--name", world, "--driver-timeout", 0.5)
     sensors = start("sensors", "--name", world)
     options = BusOptions(name=world)
     with (
@@ -209,7 +212,7 @@ def test_a_killed_simulation_gives_the_seat_back_to_its_driver(start, world, tmp
         status = wait_status(bus, lambda status: status.phase == "finished", again, sensors, driver, standby)
         assert [one.driver for one in status.drivers] == ["driver"]
     assert driver.stop() == 0
-    from phototaxis.checkpoint import load
+    from phototaxis.runtime.checkpoint import load
 
     found = {"state_hash": status.hash, "learner_hash": load(tmp_path / "driver.npz")[0].learner_hash}
     assert found == alone("--epochs", EPOCHS, "--seed", 7)

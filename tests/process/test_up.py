@@ -10,10 +10,10 @@ import sys
 import msgspec
 import psutil
 import pytest
-from phototaxis.codec import Decoder
-from phototaxis.messages import Command, Control, State
-from phototaxis.ports import free_ports
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.ports import free_ports
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.codec import Decoder
+from phototaxis.wire.messages import Command, Control, State
 from phototaxis_launcher.cli import VERBS
 from support import children, observer, phototaxis, result, wait_status
 
@@ -114,7 +114,7 @@ def test_intruders_are_refused_counted_and_harmless(up, world):
         (["--learner", "magic"], 2, "no learner 'magic'"),
         (["--epohcs", "5"], 2, "--epohcs"),
         (["--epochs", "many"], 2, "--epochs many"),
-        (["--alpha", "7"], 2, "--alpha 7"),
+        (["--learning-rate", "7"], 2, "--learning-rate 7"),
         (["--resume", "nothing.npz"], 2, "nothing.npz: no such checkpoint"),
         (["--listen", "tcp/127.0.0.1:0"], 2, "--listen"),
     ],
@@ -170,7 +170,7 @@ def test_a_learner_goes_on_from_a_checkpoint_in_another_run(up, tmp_path):
 
 
 def test_a_component_that_keeps_dying_is_given_up_with_its_last_words(tmp_path, monkeypatch):
-    from phototaxis.errors import ComponentFailed
+    from phototaxis.runtime.errors import ComponentFailed
     from phototaxis_launcher.child import Child
 
     (tmp_path / "broken.py").write_text("import sys; sys.exit('the wheel came off')")

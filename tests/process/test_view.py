@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 import pytest
-from phototaxis.errors import ComponentFailed, Unavailable, UserError
-from phototaxis.ports import free_ports
+from phototaxis.runtime.errors import ComponentFailed, Unavailable, UserError
+from phototaxis.runtime.ports import free_ports
 from phototaxis_recorder import view
 from phototaxis_recorder.headless import picture, shown_tick, viewer
 from PIL import Image

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from phototaxis.journal import Journal
-from phototaxis.machine import Append
-from phototaxis.protocol import Once
+from phototaxis.runtime.journal import Journal
+from phototaxis.runtime.machine import Append
+from phototaxis.runtime.protocol import AnswerCache
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.following import Following
@@ -121,7 +121,7 @@ MUTATIONS = [
     Mutation("publishes before the journal", AgentClient, "_drive", _later),
     Mutation("keeps no journal of the readings", Keeping, "entry", lambda _: lambda self, readings: []),
     Mutation("does not go through the journal again", Keeping, "_again", lambda _: lambda self, *given: iter(())),
-    Mutation("learns from a repeated tick again", Once, "__call__", _again),
+    Mutation("learns from a repeated tick again", AnswerCache, "__call__", _again),
     Mutation("loses the percept's history with a checkpoint", Agent, "restore", _restored_without(lights=DARK)),
     Mutation("loses the step count of the episode", Agent, "restore", _restored_without(steps=0)),
     Mutation("loses the last state with a checkpoint", Agent, "restore", _restored_without(state=(0, 0, 0, 0))),

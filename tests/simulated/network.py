@@ -7,11 +7,11 @@ from random import Random
 from typing import Any
 
 import msgspec
-from phototaxis.codec import Decoder, Refused, encode
-from phototaxis.machine import Answer, Ask, Event
-from phototaxis.messages import LogRequest, Message
-from phototaxis.roles import ROLES
-from phototaxis.topics import TOPICS
+from phototaxis.runtime.machine import Answer, Ask, Event
+from phototaxis.runtime.roles import ROLES
+from phototaxis.wire.codec import Decoder, Refused, encode
+from phototaxis.wire.messages import LogRequest, Message
+from phototaxis.wire.topics import TOPICS
 
 from simulated.process import Process
 from simulated.timeline import Timeline

@@ -6,13 +6,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from phototaxis import machine as m
-from phototaxis.chunks import Chunks
-from phototaxis.codec import Refused, encode
-from phototaxis.journal import Journal
-from phototaxis.messages import Message
-from phototaxis.runner import Runner
-from phototaxis.store import Store
+from phototaxis.runtime import machine as m
+from phototaxis.runtime.chunks import LogPublisher
+from phototaxis.runtime.journal import Journal
+from phototaxis.runtime.runner import Runner
+from phototaxis.runtime.store import Store
+from phototaxis.wire.codec import Refused, encode
+from phototaxis.wire.messages import Message
 
 if TYPE_CHECKING:
     from simulated.network import Network
@@ -53,7 +53,11 @@ class Process:
         self._wakes_at = float("inf")
 
     def start(
-        self, machine: m.Machine, journal: Journal | None = None, store: Store | None = None, log: Chunks | None = None
+        self,
+        machine: m.Machine,
+        journal: Journal | None = None,
+        store: Store | None = None,
+        log: LogPublisher | None = None,
     ) -> None:
         """Join the network and run the machine."""
         self.loop = Loop(self, machine, journal, store, log)
@@ -152,7 +156,12 @@ class Loop(Runner):
     """The real loop, one event at a time, in virtual time; it may die before any effect."""
 
     def __init__(
-        self, process: Process, machine: m.Machine, journal: Journal | None, store: Store | None, log: Chunks | None
+        self,
+        process: Process,
+        machine: m.Machine,
+        journal: Journal | None,
+        store: Store | None,
+        log: LogPublisher | None,
     ):
         super().__init__(process, machine, store, log, clock=lambda: process.network.timeline.now)
         self._process, self._journal = process, journal

@@ -3,8 +3,8 @@
 from typing import Any
 
 from msgspec.msgpack import encode
-from phototaxis.arena import Arena
-from phototaxis_sensors.choice import BuiltInChoice
+from phototaxis.geometry.arena import Arena
+from phototaxis_sensors.choice import BuiltInFactory
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.suite import Models, SensorModel, built_in
 
@@ -15,7 +15,7 @@ _KNOWN: dict[bytes, Models] = {}
 class Remembered:
     """A model that is a pure function of the pose, asked once for each."""
 
-    remembers = False
+    stateful = False
 
     def __init__(self, model: SensorModel):
         self._model, self._said = model, dict[tuple[float, float, float], Any]()
@@ -31,7 +31,7 @@ class Remembered:
         """Nothing depends on what was before."""
 
 
-class RememberedChoice(BuiltInChoice):
+class RememberedChoice(BuiltInFactory):
     """Models that all schedules of a process share."""
 
     def __call__(self, arena: Arena, scene: Scene) -> Models:

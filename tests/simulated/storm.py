@@ -14,9 +14,9 @@ from typing import Any
 
 import joblib
 import msgspec
-from phototaxis.checkpoint import load
-from phototaxis.errors import UserError
-from phototaxis.messages import World
+from phototaxis.runtime.checkpoint import load
+from phototaxis.runtime.errors import UserError
+from phototaxis.wire.messages import World
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab.loop import train

@@ -5,12 +5,12 @@ from functools import partial
 from pathlib import Path
 from random import Random
 
-from phototaxis.arena import Arena
-from phototaxis.chunks import Chunks
-from phototaxis.journal import Journal
-from phototaxis.messages import World
-from phototaxis.seat_client import Mode
-from phototaxis.store import Store
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.chunks import LogPublisher
+from phototaxis.runtime.journal import Journal
+from phototaxis.runtime.seat_client import Mode
+from phototaxis.runtime.store import Store
+from phototaxis.wire.messages import World
 from phototaxis_agent import kept
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.client import AgentClient
@@ -63,7 +63,7 @@ class System:
         process, journal = self._process("sim"), Journal(self._folder / "sim.journal")
         fresh = self._fresh()
         self._stepper = Stepper(fresh, self._pace(), lambda: "0000", open_journal(journal, fresh))
-        log = Chunks(process, "log/sim", chunks(process.ident))
+        log = LogPublisher(process, "log/sim", chunks(process.ident))
         process.start(self._stepper, journal, Store(journal), log)
         return process
 
@@ -90,7 +90,7 @@ class System:
     def sensors(self) -> Process:
         """Start the sensors."""
         process = self._process("sensors")
-        log = Chunks(process, "log/sensors", partial(chunk, process.ident))
+        log = LogPublisher(process, "log/sensors", partial(chunk, process.ident))
         process.start(Sensing(partial(make_suite, RememberedChoice())), log=log)
         return process
 
@@ -110,7 +110,7 @@ class System:
         client = AgentClient(name, make, found, True, mode, at)
         if restarted:
             self.witness.restarted(name, found)
-        log = Chunks(process, "log/agent", AgentLogs(process.ident))
+        log = LogPublisher(process, "log/agent", AgentLogs(process.ident))
         process.start(client, journal, Store(journal, path), log)
         return process
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 import msgspec
-from phototaxis import machine as m
-from phototaxis.messages import Readings, State
+from phototaxis.runtime import machine as m
+from phototaxis.wire.messages import Readings, State
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.keeping import Kept
 

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from making import readings
-from phototaxis.arena import Arena
-from phototaxis.checkpoint import load, save
-from phototaxis.errors import UserError
-from phototaxis.messages import World
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.checkpoint import load, save
+from phototaxis.runtime.errors import UserError
 from phototaxis.task import PERCEPTS
+from phototaxis.wire.messages import World
 from phototaxis_agent.exploration import Exploration, draw
-from phototaxis_agent.learner import Transition, find
+from phototaxis_agent.learner import Transition, find_learner
 from phototaxis_agent.learners.qtable import Hyperparameters, QTable
-from phototaxis_agent.setup import Setup, from_checkpoint, make_setup
+from phototaxis_agent.setup import AgentSetup, from_checkpoint, make_setup
 from phototaxis_lab.loop import Loop
 
 
@@ -27,15 +27,19 @@ def test_tables_have_the_papers_sizes_and_start(percept, entries):
 
 
 def test_equation_1():
-    learner = QTable(Hyperparameters(alpha=0.5, alpha_end=0.1, gamma=0.9), PERCEPTS["simple"], np.random.default_rng(0))
-    state, following = (0, 0, 0, 0), (2, 1, 1, 1)
+    learner = QTable(
+        Hyperparameters(learning_rate=0.5, learning_rate_end=0.1, gamma=0.9),
+        PERCEPTS["simple"],
+        np.random.default_rng(0),
+    )
+    state, next_state = (0, 0, 0, 0), (2, 1, 1, 1)
     table = np.zeros((24, 9))
     table[0, 3], table[23] = 1.0, [0, 0, 4, 0, 0, 0, 0, 0, 0]
     learner.load({"table": table})
-    error = learner.learn(Transition(state, 3, 2.0, following, terminated=False, progress=0, first=True))
+    error = learner.learn(Transition(state, 3, 2.0, next_state, terminated=False, progress=0, first=True))
     assert error == pytest.approx(2 + 0.9 * 4 - 1)
     assert learner.values(state)[3] == pytest.approx(1 + 0.5 * error)
-    learner.learn(Transition(state, 3, 3.0, following, terminated=True, progress=1, first=False))
+    learner.learn(Transition(state, 3, 3.0, next_state, terminated=True, progress=1, first=False))
     assert learner.values(state)[3] == pytest.approx((1 + 0.5 * error) * 0.9 + 0.3)
 
 
@@ -48,13 +52,13 @@ def test_equation_2():
 
 
 def test_temperature_falls_and_stays():
-    exploration = Exploration(hot=1.0, cold=0.01, cooling=0.5)
+    exploration = Exploration(temperature_start=1.0, temperature_end=0.01, exploration_fraction=0.5)
     assert exploration.temperature(0, 1000) == 1
     assert exploration.temperature(250, 1000) == pytest.approx(0.1)
     assert exploration.temperature(500, 1000) == exploration.temperature(10_000, 1000) == 0.01
 
 
-def test_the_agent_learns_from_the_action_that_was_applied(setup: Setup, paper: Arena):
+def test_the_agent_learns_from_the_action_that_was_applied(setup: AgentSetup, paper: Arena):
     agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=0))
     agent(readings(0))
     before = agent.learner.save()["table"]
@@ -77,7 +81,7 @@ def test_episodes_end_at_the_light_and_after_their_last_step(paper: Arena):
     assert agent(readings(9, episode=1, light=(0.2, 0.96))).end == "terminated"
 
 
-def test_a_checkpoint_continues_bit_for_bit(tmp_path: Path, setup: Setup, paper: Arena):
+def test_a_checkpoint_continues_bit_for_bit(tmp_path: Path, setup: AgentSetup, paper: Arena):
     whole = Loop(paper, setup.agent(World(run="r", arena=paper, seed=3, epochs=2000)), 3, 2000)
     for tick in range(1700):
         if tick == 1000:
@@ -96,7 +100,7 @@ def test_a_checkpoint_continues_bit_for_bit(tmp_path: Path, setup: Setup, paper:
 
 
 @pytest.fixture
-def file(tmp_path: Path, setup: Setup, paper: Arena) -> Path:
+def file(tmp_path: Path, setup: AgentSetup, paper: Arena) -> Path:
     agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=10))
     agent(readings(0))
     save(tmp_path / "c.npz", *agent.checkpoint())
@@ -140,13 +144,13 @@ def test_a_checkpoint_knows_its_setup(file: Path):
 
 def test_an_unknown_learner_lists_those_there_are():
     with pytest.raises(UserError, match=r"no learner 'magic'; there are: .*qtable"):
-        find("magic")
+        find_learner("magic")
 
 
-def test_a_frozen_agent_does_not_learn(setup: Setup, paper: Arena):
+def test_a_frozen_agent_does_not_learn(setup: AgentSetup, paper: Arena):
     agent = setup.agent(World(run="r", arena=paper, seed=0, epochs=0), learning=False)
     before = agent.checkpoint()[0].learner_hash
     for tick in range(20):
         agent(readings(tick, left=1.0, right=1.0, author="a"))
     assert agent.checkpoint()[0].learner_hash == before
-    assert math.isclose(agent.last.temperature, agent.policy.exploration.cold)
+    assert math.isclose(agent.last.temperature, agent.policy.exploration.temperature_end)

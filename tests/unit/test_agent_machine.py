@@ -7,12 +7,11 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from phototaxis.arena import Arena
-from phototaxis.checkpoint import decode, encode, learner_hash
-from phototaxis.columns import COUNT, FLAG, pack
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.journal import GIVEN_UP, Journal
-from phototaxis.machine import (
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.checkpoint import decode, encode, learner_hash
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.journal import GIVEN_UP, Journal
+from phototaxis.runtime.machine import (
     STOP,
     TIME,
     Answer,
@@ -32,24 +31,25 @@ from phototaxis.machine import (
     Unwritten,
     Warn,
 )
-from phototaxis.messages import (
+from phototaxis.runtime.seat_client import Place
+from phototaxis.runtime.store import Store
+from phototaxis.wire.columns import COUNT, FLAG, pack
+from phototaxis.wire.messages import (
+    BatchReadings,
     CheckpointReply,
     CheckpointRequest,
     Command,
     ControlReply,
     Readings,
-    ReadingsOfMany,
     Status,
     World,
 )
-from phototaxis.seat_client import Place
-from phototaxis.store import Store
 from phototaxis_agent import kept
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.following import ASK_AGAIN_S, INHERIT_WITHIN_S
 from phototaxis_agent.keeping import SAVE_EVERY_S, Kept
 from phototaxis_agent.rows import AgentLogs
-from phototaxis_agent.setup import Setup, make_setup
+from phototaxis_agent.setup import AgentSetup, make_setup
 from phototaxis_lab.loop import Loop
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim.simulation import Simulation
@@ -60,7 +60,7 @@ TICKS = 150
 class Desk:
     """An agent's machine with everything that its effects reach: what it publishes, asks, says and writes."""
 
-    def __init__(self, world: World, setup: Setup | None = None, ident: str = "a", **options):
+    def __init__(self, world: World, setup: AgentSetup | None = None, ident: str = "a", **options):
         self.world, self.now = world, 0.0
         agent = (setup or make_setup()).agent
         self.machine = AgentClient(ident, lambda world: agent(world), **options)
@@ -108,7 +108,7 @@ class Desk:
             self.asked.append(effect)
         if isinstance(effect, (Save, Begin, Append)) and (failed := self._write(effect)):
             self.journal = None if failed == "journal" else self.journal
-            self.give(Event("unwritten", Unwritten(failed, f"{failed} is full")))
+            self.give(Event("write_failure", Unwritten(failed, f"{failed} is full")))
 
     def _write(self, effect: Save | Begin | Append) -> str:
         if isinstance(effect, Append):
@@ -688,26 +688,26 @@ def test_who_asks_another_agent_or_nothing_gets_no_answer(world):
 def test_many_robots_are_driven_by_the_same_machine(world):
     many = msgspec.structs.replace(world, robots=3)
     none, light = pack(np.zeros(3)), pack(np.full((2, 3), 0.1))
-    readings = ReadingsOfMany(
+    readings = BatchReadings(
         run="r", tick=0, epoch=0, episode=pack(np.zeros(3), COUNT), sonar=pack(np.full((16, 3), 5.0)), light=light,
         contact=pack(np.zeros((2, 3)), FLAG), left=none, right=none, author="", driver="a",
     )  # fmt: skip
     desk = Desk(many, keeps=True)
-    desk.give(Event("crowd/readings", readings))
+    desk.give(Event("batch/readings", readings))
     effects = desk.answer(many)
     assert kinds(effects) == [Flush, Begin, Say, Publish, Record], "no journal of its ticks is kept"
-    assert [one.topic for one in effects if isinstance(one, Publish)] == ["crowd/command"]
-    (refused,) = desk.give(Event("crowd/readings", msgspec.structs.replace(readings, tick=1, sonar=b"")))
+    assert [one.topic for one in effects if isinstance(one, Publish)] == ["batch/command"]
+    (refused,) = desk.give(Event("batch/readings", msgspec.structs.replace(readings, tick=1, sonar=b"")))
     assert isinstance(refused, Refuse)
     assert desk.give(Event("readings", Play(world).readings("a"))) == [], "those of one robot do not belong here"
     taking = taker(many)
-    taking.give(Event("crowd/readings", readings))
+    taking.give(Event("batch/readings", readings))
     taking.answer(many)
     assert [one.topic for one in taking.asked] == ["control"], "nobody is its equal before it sits down"
-    taking.give(Event("crowd/readings", msgspec.structs.replace(readings, driver="b")))
+    taking.give(Event("batch/readings", msgspec.structs.replace(readings, driver="b")))
     assert taking.asked[-1].agent == "a"
     heir = Desk(many, mode="stand by")
-    heir.give(Event("crowd/readings", readings))
+    heir.give(Event("batch/readings", readings))
     with pytest.raises(UserError, match="a standby keeps in step with the driver of one robot; this world has 3"):
         heir.answer(many)
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from phototaxis import checkpoint, errors
-from phototaxis.arena import Arena
-from phototaxis.errors import UserError
-from phototaxis.journal import Journal
-from phototaxis.messages import World
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime import checkpoint, errors
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.journal import Journal
+from phototaxis.wire.messages import World
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab import evaluate
 from phototaxis_recorder.recordings import table

@@ -7,10 +7,10 @@ from importlib import resources
 import msgspec
 import numpy as np
 import pytest
-from phototaxis.arena import Disc, Placement, Sensing
-from phototaxis.codec import Decoder, Refused
-from phototaxis.errors import UserError
-from phototaxis.messages import World
+from phototaxis.geometry.arena import Disc, Placement, Sensing
+from phototaxis.runtime.errors import UserError
+from phototaxis.wire.codec import Decoder, Refused
+from phototaxis.wire.messages import World
 from phototaxis_sim import arenas
 from phototaxis_sim.physics import Physics
 from phototaxis_sim.simulation import Simulation
@@ -119,10 +119,10 @@ def test_two_dim_lights_make_a_bright_place(enter):
 
 
 def test_where_episodes_end_by_themselves_a_dim_light_is_a_warning(enter, monkeypatch, capsys):
-    monkeypatch.setattr("phototaxis.errors._said", set())
+    monkeypatch.setattr("phototaxis.runtime.errors._said", set())
     with pytest.raises(UserError):
         enter(HEAD + LIGHT + "brightness = 0.1\n")
-    assert arenas.enter("t.toml", goal=False).lights[0].brightness == 0.1
+    assert arenas.load_checked("t.toml", goal=False).lights[0].brightness == 0.1
     assert "lights[0].brightness: no sensor can ever read" in capsys.readouterr().err
 
 
@@ -133,7 +133,7 @@ def enter(tmp_path, capsys, monkeypatch):
 
     def do(text: str) -> str:
         (tmp_path / "t.toml").write_text(text)
-        arenas.enter("t.toml")
+        arenas.load_checked("t.toml")
         return capsys.readouterr().err
 
     return do
@@ -158,7 +158,7 @@ def test_nothing_is_suspicious_about_what_is_shipped(name, enter, paper):
     ],
 )
 def test_what_is_suspicious_is_one_warning(enter, monkeypatch, text, words):
-    monkeypatch.setattr("phototaxis.errors._said", set())
+    monkeypatch.setattr("phototaxis.runtime.errors._said", set())
     said = enter(text)
     assert said.startswith("phototaxis: warning: t.toml: ")
     assert said.count("\n") == 1

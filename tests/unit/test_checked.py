@@ -13,21 +13,21 @@ import numpy as np
 import pytest
 import torch
 from making import readings
-from phototaxis.arena import Arena
-from phototaxis.checkpoint import encode
-from phototaxis.codec import encode as on_the_wire
-from phototaxis.errors import ComponentFailed, UserError
-from phototaxis.messages import AgentLog
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.checkpoint import encode
+from phototaxis.runtime.errors import ComponentFailed, UserError
 from phototaxis.task import BatchObservation, Episode, TaskOptions
+from phototaxis.wire.codec import encode as on_the_wire
+from phototaxis.wire.messages import AgentLog
 from phototaxis_agent import policy as module
 from phototaxis_agent.agent import Agent
-from phototaxis_agent.crowd import CrowdAgent
+from phototaxis_agent.batch_agent import BatchAgent
 from phototaxis_agent.exploration import Exploration
 from phototaxis_agent.learner import Learner, discrete
 from phototaxis_agent.learners.qtable import QTable
 from phototaxis_agent.policy import Policy
 from phototaxis_agent.setup import make_setup
-from phototaxis_agent.stuck import watched
+from phototaxis_agent.watchdog import watchdog
 from phototaxis_lab.loop import Loop
 from phototaxis_lab.measure import evaluate
 
@@ -49,7 +49,7 @@ class Table(Learner):
 
     def learn(self, transition) -> Any:
         here = (*map(int, transition.state), transition.action)
-        error = transition.reward + 0.7 * max(Table.values(self, transition.following)) - self.q[here]
+        error = transition.reward + 0.7 * max(Table.values(self, transition.next_state)) - self.q[here]
         self.q[here] += self.rate * error
         return float(error)
 
@@ -66,7 +66,7 @@ def make(monkeypatch: pytest.MonkeyPatch):
 
     def agent(percept: Any = "simple", learning: bool = True, **methods: Any) -> Agent:
         kind = type("Theirs", (Table,), methods)
-        monkeypatch.setattr(module, "find", lambda _: kind)
+        monkeypatch.setattr(module, "find_learner", lambda _: kind)
         task = TaskOptions(percept=percept)
         return Agent(Policy("theirs", None, task, Exploration(), near=0.4, seed=1, budget=100, learning=learning))
 
@@ -267,7 +267,7 @@ def context(given: Any) -> dict[str, Any]:
         "remember": lambda self, state, action, gain: given,
         "values": lambda self, state: Table.values(self, state[:-1]),
         "learn": lambda self, step: Table.learn(
-            self, step._replace(state=step.state[:-1], following=step.following[:-1])
+            self, step._replace(state=step.state[:-1], next_state=step.next_state[:-1])
         ),
     }
 
@@ -284,9 +284,9 @@ def test_a_context_of_numpy_numbers_can_be_kept(make):
 def test_values_of_many_are_checked_as_those_of_one(make, paper: Arena):
     for methods, expected in (
         ({"values": lambda self, state: [math.nan] * 9}, "values() gave nan"),
-        ({"values_of": lambda self, states: np.zeros(len(states))}, "expected 7×9 numbers"),
-        ({"values_of": lambda self, states: np.full((len(states), 9), math.inf)}, "values_of() gave inf"),
-        ({"values_of": fail}, "values_of() raised KeyError"),
+        ({"batch_values": lambda self, states: np.zeros(len(states))}, "expected 7×9 numbers"),
+        ({"batch_values": lambda self, states: np.full((len(states), 9), math.inf)}, "batch_values() gave inf"),
+        ({"batch_values": fail}, "batch_values() raised KeyError"),
         ({**context((np.zeros(3),)), "values": lambda self, state: [0.0] * 9}, "remember() gave 3 numbers"),
     ):
         agent = make(learning=False, **methods)
@@ -300,14 +300,14 @@ def test_a_learner_cannot_change_the_states_of_a_crowd(make, paper: Arena):
         states[:] = 5.0
         return np.zeros((len(states), 9))
 
-    agent = make(learning=False, values_of=careless)
-    crowd = CrowdAgent(agent.policy, 0.4, 3, 0)
+    agent = make(learning=False, batch_values=careless)
+    batch = BatchAgent(agent.policy, 0.4, 3, 0)
     evaluate(paper, agent.policy, 3, 0, max_episode_steps=2)
     dark, free = np.zeros(3), np.zeros(3, bool)
     episode = Episode(100, 3)
     episode.begin(BatchObservation(np.full((16, 3), 5.0), np.stack([dark, dark]), free, free))
-    crowd(episode)
-    assert not (crowd._state == 5.0).any()
+    batch(episode)
+    assert not (batch._state == 5.0).any()
 
 
 def test_a_recorded_run_is_the_run_of_a_learner_that_draws_when_asked(make, paper: Arena):
@@ -338,7 +338,7 @@ def test_a_learner_that_does_not_return_is_named(make, capfd: pytest.CaptureFixt
             time.sleep(0.01)
         return 0.0
 
-    with watched(0.05):
+    with watchdog(0.05):
         drive(make(learn=slow), 2)
     assert said.startswith("phototaxis: warning: learner theirs: learn() has not returned for 0.05 s (")
     assert HERE in said
@@ -356,14 +356,14 @@ def test_a_constructor_that_does_not_return_is_named(monkeypatch, capfd: pytest.
         QTable.__init__(self, options, percept, rng)
 
     setup = make_setup()
-    monkeypatch.setattr(module, "find", lambda _: type("Theirs", (QTable,), {"__init__": slow}))
-    monkeypatch.setattr("phototaxis_agent.setup.watched", lambda: watched(0.05))
+    monkeypatch.setattr(module, "find_learner", lambda _: type("Theirs", (QTable,), {"__init__": slow}))
+    monkeypatch.setattr("phototaxis_agent.setup.watchdog", lambda: watchdog(0.05))
     setup.check()
     assert "learner qtable: __init__() has not returned" in said
 
 
 def test_the_process_of_whoever_embeds_a_learner_is_left_as_it_is(paper: Arena):
-    from phototaxis.messages import World
+    from phototaxis.wire.messages import World
     from phototaxis_agent.setup import make_setup
 
     threads, drawn = torch.get_num_threads(), torch.random.get_rng_state()

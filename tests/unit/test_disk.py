@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 from disks import no_file_larger_than
-from phototaxis.disk import try_file, try_folder, write_whole
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.journal import GIVEN_UP, Journal
+from phototaxis.runtime.disk import check_folder_writable, check_writable, write_atomic
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.journal import GIVEN_UP, Journal
 from phototaxis_lab import train
 from phototaxis_lab.cell import Cell, Outcome, System
 from phototaxis_lab.results import Results
 
 
-@pytest.mark.parametrize("try_place", [try_file, try_folder])
+@pytest.mark.parametrize("try_place", [check_writable, check_folder_writable])
 def test_a_place_that_takes_nothing_is_told_before_the_work_begins(tmp_path: Path, try_place):
     with no_file_larger_than(100), pytest.raises(Unavailable, match=r"--out .*/x: File too large; free some space"):
         try_place(tmp_path / "x", "--out")
@@ -30,26 +30,26 @@ def test_a_place_that_is_none_is_bad_input(tmp_path: Path):
         (tmp_path / ("x" * 300), "File name too long"),
     ):
         with pytest.raises(UserError, match=line) as found:
-            try_file(path, "--out")
+            check_writable(path, "--out")
         assert found.value.exit_code == 2
     with pytest.raises(UserError, match=r"--out .*: Not a directory"):
-        try_folder(tmp_path / "file" / "x", "--out")
+        check_folder_writable(tmp_path / "file" / "x", "--out")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_a_trial_changes_nothing(tmp_path: Path):
     file = tmp_path / "x"
     file.write_text("old")
-    try_file(file, "--out")
-    try_folder(tmp_path, "--out")
+    check_writable(file, "--out")
+    check_folder_writable(tmp_path, "--out")
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("x", "old")]
 
 
 def test_an_old_file_outlives_a_new_one_that_does_not_fit(tmp_path: Path):
     file = tmp_path / "x"
-    write_whole(file, b"old")
+    write_atomic(file, b"old")
     with no_file_larger_than(100), pytest.raises(Unavailable, match=r"/x: File too large"):
-        write_whole(file, bytes(200))
+        write_atomic(file, bytes(200))
     assert file.read_bytes() == b"old"
     assert [path.name for path in tmp_path.iterdir()] == ["x"]
 
@@ -57,13 +57,13 @@ def test_an_old_file_outlives_a_new_one_that_does_not_fit(tmp_path: Path):
 def test_links_and_devices_stay_what_they_are(tmp_path: Path):
     target, link = tmp_path / "target", tmp_path / "link"
     link.symlink_to(target)
-    try_file(link, "--out")
-    write_whole(link, b"new")
+    check_writable(link, "--out")
+    write_atomic(link, b"new")
     assert link.is_symlink()
     assert target.read_bytes() == b"new"
     device = tmp_path / "device"
     device.symlink_to("/dev/full")
-    for write in (lambda: try_file(device, "--out"), lambda: write_whole(device, b"new")):
+    for write in (lambda: check_writable(device, "--out"), lambda: write_atomic(device, b"new")):
         with pytest.raises(Unavailable, match="No space left on device"):
             write()
     assert os.path.realpath(device) == "/dev/full"

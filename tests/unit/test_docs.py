@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from phototaxis import options
+from phototaxis.runtime import options
 from phototaxis_lab import train
 from phototaxis_launcher import cli, swap
 from phototaxis_launcher.options import parse
@@ -151,7 +151,10 @@ def test_the_learner_of_the_page_plugs_in_and_learns(tmp_path: Path, monkeypatch
     plug_in(tmp_path, point, monkeypatch)
     checkpoint = tmp_path / "mine.npz"
     assert (
-        train.main(["--learner", "double-q", "--rate", "0.2", "--epochs", "200", "--checkpoint", str(checkpoint)]) == 0
+        train.main(
+            ["--learner", "double-q", "--learning-rate", "0.2", "--epochs", "200", "--checkpoint", str(checkpoint)]
+        )
+        == 0
     )
     assert sys.modules.pop("double_q").__file__ == str(tmp_path / "double_q.py")
     assert "200 epochs" in capsys.readouterr().out

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 from making import readings
-from phototaxis.messages import ENDS
 from phototaxis.task import REWARDS, BatchObservation, Episode
+from phototaxis.wire.messages import ENDS
 
 COUNT, TICKS, MAX_STEPS = 6, 60, 9
 

@@ -10,15 +10,15 @@ import psutil
 import pytest
 from fmpy.validation import validate_fmu
 from fmus import KNOWN, Built, described, edited
-from phototaxis.arena import Arena, Light
-from phototaxis.errors import UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import World
+from phototaxis.geometry.arena import Arena, Light
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.wire.messages import World
 from phototaxis_fmu.description import read
 from phototaxis_fmu.sensors import FmuSensors
 from phototaxis_fmu.wiring import SUITES, connect
-from phototaxis_sensors.crowd import CrowdSuite
-from phototaxis_sensors.model import Past
+from phototaxis_sensors.batch_suite import BatchSuite
+from phototaxis_sensors.model import PastMoment
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.suite import SensorSuite, built_in
 from phototaxis_sim.simulation import Simulation
@@ -26,11 +26,11 @@ from phototaxis_sim.simulation import Simulation
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
 
 
-def drive(count: int, episode: int = 50, seed: int = 0) -> list[Past]:
+def drive(count: int, episode: int = 50, seed: int = 0) -> list[PastMoment]:
     """A robot that is everywhere."""
     chance = random.Random(seed)
     where = [(chance.uniform(0.3, 9.7), chance.uniform(0.3, 9.7), chance.uniform(-4, 4)) for _ in range(count)]
-    return [Past(tick, tick // episode, *pose) for tick, pose in enumerate(where)]
+    return [PastMoment(tick, tick // episode, *pose) for tick, pose in enumerate(where)]
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def test_sixteen_beams_in_one_instance_or_one_in_each(fmu: Built, paper: Arena, 
     one_each = plain(paper, Scene(paper)).sonar
     near = [moment for moment in drive(400) if max(ours(moment)) < 5]
     for tick, moment in enumerate(near):
-        now = Past(tick, 0, moment.x, moment.y, moment.heading)
+        now = PastMoment(tick, 0, moment.x, moment.y, moment.heading)
         assert one_each(now) == pytest.approx(ours(moment), abs=1e-12)
 
 
@@ -98,12 +98,12 @@ def test_sixteen_beams_in_one_instance_or_one_in_each(fmu: Built, paper: Arena, 
 def test_many_robots_have_their_own_instances(fmu: Built, paper: Arena, sensors, version):
     quiet = msgspec.structs.replace(paper, sensing=msgspec.structs.replace(paper.sensing, noise=0.0))
     world = World(run="w", arena=quiet, seed=3, epochs=0)
-    ours = CrowdSuite(world)
+    ours = BatchSuite(world)
     poses = np.array([[moment.x, moment.y, moment.heading] for moment in drive(30)])
     for kind, name in (("light", "light"), ("sonar", "sonar")):
-        crowd = sensors(**{f"{kind}_fmu": str(fmu(name, version))}).crowd(world, len(poses))
+        batch = sensors(**{f"{kind}_fmu": str(fmu(name, version))}).batch(world, len(poses))
         for tick in range(3):
-            sonar, light = crowd(tick, poses)
+            sonar, light = batch(tick, poses)
             expected_sonar, expected_light = ours(tick, poses)
             if kind == "light":
                 assert np.abs(light - expected_light).max() < 1e-12
@@ -111,12 +111,12 @@ def test_many_robots_have_their_own_instances(fmu: Built, paper: Arena, sensors,
             else:
                 assert np.abs(sonar - expected_sonar).max() <= 0.1
                 assert np.array_equal(light, expected_light)
-    lag = sensors(light_fmu=str(fmu("lag", version))).crowd(world, len(poses))
+    lag = sensors(light_fmu=str(fmu("lag", version))).batch(world, len(poses))
     single = sensors(light_fmu=str(fmu("lag", version)))(paper, Scene(paper)).light
     for tick in range(5):
         where = np.roll(poses, tick, axis=0)
         both = lag(tick, where)[1][:, 0]
-        assert both == pytest.approx(single(Past(tick, 0, *where[0])), abs=1e-9)
+        assert both == pytest.approx(single(PastMoment(tick, 0, *where[0])), abs=1e-9)
 
 
 def test_names_units_and_parameters(fmu: Built, paper: Arena, sensors, tmp_path: Path):
@@ -211,7 +211,7 @@ def test_ten_thousand_episodes_with_one_load_take_no_more_memory(fmu: Built, pap
     host = model._stepped._host
     pid, sizes = host.pid, []
     for episode in range(10_001):
-        model(Past(episode, episode, 3, 3, 0))
+        model(PastMoment(episode, episode, 3, 3, 0))
         if episode in (1_000, 10_000):
             sizes.append(psutil.Process(pid).memory_info().rss)
     assert host.pid == pid, "loaded once"

@@ -12,20 +12,20 @@ import numpy as np
 import psutil
 import pytest
 from fmus import Built, altered, described, edited
-from phototaxis.arena import Arena
-from phototaxis.errors import UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import World
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.wire.messages import World
 from phototaxis_fmu.build import Version, build
 from phototaxis_fmu.description import read
 from phototaxis_fmu.examples import EXAMPLES
 from phototaxis_fmu.host import Host
-from phototaxis_fmu.log import LONGEST, SHOWN, one_line
-from phototaxis_fmu.pace import pace
+from phototaxis_fmu.log import MAX_LINE_CHARACTERS, MAX_LINES, one_line
+from phototaxis_fmu.pace import plan_steps
 from phototaxis_fmu.sensors import FmuSensors
 from phototaxis_fmu.start import start_value
 from phototaxis_fmu.wiring import SUITES, connect
-from phototaxis_sensors.model import Past
+from phototaxis_sensors.model import PastMoment
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.suite import built_in
 
@@ -38,10 +38,12 @@ HEAD = {2: "fmi2Status fmi2Reset(fmi2Component c) {", 3: "fmi3Status fmi3Reset(f
 ONCE = {"canHandle": 'canBeInstantiatedOnlyOncePerProcess="true" canHandle'}
 
 
-def drive(count: int, episode: int = 15) -> list[Past]:
+def drive(count: int, episode: int = 15) -> list[PastMoment]:
     """A robot that goes round the room."""
     angles = [0.7 * tick for tick in range(count)]
-    return [Past(t, t // episode, 5 + 4 * math.sin(a), 5 + 4 * math.cos(1.3 * a), a) for t, a in enumerate(angles)]
+    return [
+        PastMoment(t, t // episode, 5 + 4 * math.sin(a), 5 + 4 * math.cos(1.3 * a), a) for t, a in enumerate(angles)
+    ]
 
 
 class Makes:
@@ -68,7 +70,7 @@ def sensors():
     makes.end()
 
 
-def readings(make: FmuSensors, arena: Arena, moments: list[Past], kind: str = "light") -> list[list[float]]:
+def readings(make: FmuSensors, arena: Arena, moments: list[PastMoment], kind: str = "light") -> list[list[float]]:
     """What one kind of sensor reads on the way."""
     model = getattr(make(arena, Scene(arena)), kind)
     return [list(model(moment)) for moment in moments]
@@ -131,7 +133,7 @@ def test_many_robots_with_an_fmu_that_cannot_be_reset(fmu: Built, paper: Arena, 
         World(run="w", arena=paper, seed=3, epochs=0),
         np.array([[moment.x, moment.y, moment.heading] for moment in drive(10)]),
     )
-    both = [sensors(light_fmu=str(file)).crowd(world, len(poses)) for file in (odd, fmu("lag", 2))]
+    both = [sensors(light_fmu=str(file)).batch(world, len(poses)) for file in (odd, fmu("lag", 2))]
     for tick in range(3):
         assert np.array_equal(both[0](tick, poses)[1], both[1](tick, poses)[1])
 
@@ -191,7 +193,7 @@ def test_which_steps_an_fmu_gets(fmu: Built, tmp_path: Path, interface, step, pe
     if step:
         wish = f'<DefaultExperiment stepSize="{step}"/><ModelVariables>'
         file = described(file, tmp_path / "b.fmu", "<ModelVariables>", wish)
-    found = pace(read(str(file)).description, period, 0.0)
+    found = plan_steps(read(str(file)).description, period, 0.0)
     assert found[:2] == pytest.approx(expected[:2])
     assert re.search(expected[2], found.remark)
     assert bool(expected[2]) == bool(found.remark)
@@ -199,7 +201,7 @@ def test_which_steps_an_fmu_gets(fmu: Built, tmp_path: Path, interface, step, pe
 
 def test_a_step_that_is_no_length_is_refused(fmu: Built):
     with pytest.raises(UserError, match=r"the control period, 0.5 s, is no whole number of such steps"):
-        pace(read(str(fmu("lag", 2))).description, 0.5, 1e-320)
+        plan_steps(read(str(fmu("lag", 2))).description, 0.5, 1e-320)
 
 
 # -- limits
@@ -214,11 +216,11 @@ def test_rounding_beyond_a_limit_is_put_back(paper: Arena, sensors, tmp_path: Pa
     words = {"fmu_param": ["fault=4", "at=1"], "fmu_map": ["reading=y"], "fmu_fallback": True}
     make = sensors(sonar_fmu=str(odd), **words)
     model = make(paper, Scene(paper)).sonar
-    assert model(Past(0, 0, 5, 5, 0)) == ([expected] * 16 if expected is not None else list(built(paper)))
+    assert model(PastMoment(0, 0, 5, 5, 0)) == ([expected] * 16 if expected is not None else list(built(paper)))
 
 
 def built(arena: Arena):
-    return built_in(arena, Scene(arena)).sonar(Past(0, 0, 5, 5, 0))
+    return built_in(arena, Scene(arena)).sonar(PastMoment(0, 0, 5, 5, 0))
 
 
 def test_readings_below_0_are_clipped_as_those_above_1(paper: Arena, sensors, tmp_path: Path):
@@ -299,7 +301,7 @@ def test_what_an_fmu_says_is_bounded(paper: Arena, sensors, tmp_path: Path, caps
     readings(sensors(light_fmu=str(odd), fmu_map=["raw=u", "reading=y"], fmu_param=["at=99"]), paper, drive(5))
     sensors.end()
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == SHOWN + 1
+    assert len(lines) == MAX_LINES + 1
     assert lines[0].endswith("prints: line 0 of 0")
     assert lines[-1].endswith("says more, which is not shown (--fmu-log shows more)")
 
@@ -307,7 +309,7 @@ def test_what_an_fmu_says_is_bounded(paper: Arena, sensors, tmp_path: Path, caps
 def test_a_line_is_bounded_and_printable():
     assert one_line(b"\x00\xff\xfe a\r\n\tb \x1b[31m") == "\ufffd\ufffd\ufffd a b \ufffd[31m"
     long = one_line(b"begin" + b"x" * 5_000_000 + b"the end")
-    assert len(long) <= LONGEST + 3
+    assert len(long) <= MAX_LINE_CHARACTERS + 3
     assert long.startswith("begin")
     assert long.endswith("the end")
 
@@ -355,7 +357,7 @@ def test_the_helpers_of_an_fmu_end_with_it(paper: Arena, sensors, tmp_path: Path
     fault = {"crash": 5, "endless": 6}.get(end, 0)
     make = sensors(light_fmu=str(odd), fmu_param=[f"fault={fault}", "at=2"], fmu_timeout=0.3, fmu_fallback=True)
     model = make(paper, Scene(paper)).light
-    model(Past(0, 0, 5, 5, 0))
+    model(PastMoment(0, 0, 5, 5, 0))
     host = model._stepped._host
     assert isinstance(host, Host)
     begun_by = time.monotonic() + 5
@@ -365,7 +367,7 @@ def test_the_helpers_of_an_fmu_end_with_it(paper: Arena, sensors, tmp_path: Path
     if end == "killed":
         psutil.Process(host.pid).kill()
     elif fault:
-        model(Past(1, 0, 5, 5, 0))
+        model(PastMoment(1, 0, 5, 5, 0))
         assert model._stepped.failed
     make.close()
     assert sleeping(seconds) == []

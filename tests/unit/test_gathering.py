@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from phototaxis.machine import START, STOP, TIME, Answer, Ask, Effect, Event, Stop
-from phototaxis.messages import LogRequest, SimLog, World
-from phototaxis.transitions import diagram
+from phototaxis.runtime.machine import START, STOP, TIME, Answer, Ask, Effect, Event, Stop
+from phototaxis.runtime.transitions import diagram
+from phototaxis.wire.messages import LogRequest, SimLog, World
 from phototaxis_recorder.gathering import (
     ASK_EVERY_S,
     BEHIND_TICKS,

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from gymnasium.error import Error, InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
-from phototaxis.messages import World
 from phototaxis.task import ACTIONS, REWARDS
+from phototaxis.wire.messages import World
 from phototaxis_agent.setup import make_setup
 from phototaxis_gym.single import LightSeeker
 from phototaxis_lab.loop import Loop

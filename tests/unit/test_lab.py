@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from phototaxis.errors import Unavailable, UserError
+from phototaxis.runtime.errors import Unavailable, UserError
 from phototaxis_lab.cell import Cell, Outcome, System, learn, run
 from phototaxis_lab.experiment import Options, cells, main
 from phototaxis_lab.results import Results, alone_in

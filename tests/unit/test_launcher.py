@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import Control, Phase, Status, World
-from phototaxis.ports import find_ports, free_ports
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.runtime.ports import find_ports, free_ports
+from phototaxis.wire.messages import Control, Phase, Status, World
 from phototaxis_agent.setup import make_setup
 from phototaxis_launcher import demo, swap
 from phototaxis_launcher.child import Child
@@ -18,7 +18,7 @@ from phototaxis_launcher.cli import extra_with
 from phototaxis_launcher.folder import RunFolder
 from phototaxis_launcher.news import News
 from phototaxis_launcher.options import UpOptions, parse
-from phototaxis_launcher.places import places
+from phototaxis_launcher.paths import run_paths
 from phototaxis_launcher.processes import Processes
 from phototaxis_launcher.progress import success
 from phototaxis_recorder.recordings import table
@@ -137,7 +137,7 @@ def test_a_recording_tells_success_of_episodes_that_have_ended(episodes, words):
 def test_the_end_says_how_to_look_again(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = str(tmp_path / "my runs" / "recording.rrd")
-    lines = places({"recording": file, "checkpoint": None, "drivers": [{"driver": "stranger-1"}]})
+    lines = run_paths({"recording": file, "checkpoint": None, "drivers": [{"driver": "stranger-1"}]})
     assert lines[0].endswith(file)
     assert lines[1].endswith("phototaxis view 'my runs/recording.rrd'")
     assert lines[2] == "checkpoint  none: stranger-1 drove last, and saved none here"

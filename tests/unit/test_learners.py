@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import torch
 from making import own_learners
-from phototaxis.arena import Arena
-from phototaxis.checkpoint import learner_hash, load, save
-from phototaxis.errors import UserError
-from phototaxis.messages import World
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.checkpoint import learner_hash, load, save
+from phototaxis.runtime.errors import UserError
 from phototaxis.task import ACTIONS, MIRRORED, PERCEPTS
+from phototaxis.wire.messages import World
 from phototaxis_agent import context
 from phototaxis_agent.inputs import OneHot, Scaled
-from phototaxis_agent.learner import Learner, Transition, find
+from phototaxis_agent.learner import Learner, Transition, find_learner
 from phototaxis_agent.perceptron import Hyperparameters, Perceptron
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab.loop import Loop
@@ -23,7 +23,7 @@ EVERY = [(name, percept) for name in TABLES + NETS for percept in PERCEPTS if na
 
 def make(name: str, percept: str, **options) -> Learner:
     setup = make_setup(name, percept=percept, **options)
-    return find(name)(setup.hyperparameters, PERCEPTS[percept], np.random.default_rng(0))
+    return find_learner(name)(setup.hyperparameters, PERCEPTS[percept], np.random.default_rng(0))
 
 
 def test_these_are_the_names():
@@ -55,7 +55,7 @@ def test_values_of_many_are_values_of_each(paper: Arena, name, percept):
         states.append(agent._state)
         actions.append(max(agent.last.action, 0))
     learner = agent.learner
-    found = learner.values_of(np.array(states, dtype=float))
+    found = learner.batch_values(np.array(states, dtype=float))
     assert found.shape == (60, len(PERCEPTS[percept].actions))
     assert found == pytest.approx(np.array([learner.values(state) for state in states]), abs=1e-6)
     gains = np.linspace(-1, 1, 60)
@@ -80,15 +80,15 @@ def test_a_table_needs_states_that_can_be_counted(name):
         make(name, "continuous")
 
 
-def step(state, action, reward, following, terminated=False, first=False) -> Transition:
-    return Transition(state, action, reward, following, terminated, 0.0, first)
+def step(state, action, reward, next_state, terminated=False, first=False) -> Transition:
+    return Transition(state, action, reward, next_state, terminated, 0.0, first)
 
 
 A, B, C = (0, 0, 0, 0), (2, 0, 0, 0), (2, 1, 0, 0)
 
 
 def test_qlambda_corrects_what_led_to_an_error():
-    learner = make("qlambda", "simple", alpha=0.5, gamma=0.8, decay=0.5)
+    learner = make("qlambda", "simple", learning_rate=0.5, gamma=0.8, trace_decay=0.5)
     learner.load({"table": np.zeros((24, 9)), "traces": np.empty((0, 3))})
     learner.learn(step(A, 3, 0.0, B, first=True))
     learner.learn(step(B, 4, 1.0, C))
@@ -101,7 +101,7 @@ def test_qlambda_corrects_what_led_to_an_error():
 
 
 def folded(**options) -> Learner:
-    return make("mirror", "simple", gamma=0.8, start=0.0, ridge=1e-6, memory="none", **options)
+    return make("mirror", "simple", gamma=0.8, initial_value=0.0, ridge=1e-6, context="none", **options)
 
 
 def test_mirror_shares_entries_with_the_mirror_image():
@@ -113,7 +113,7 @@ def test_mirror_shares_entries_with_the_mirror_image():
 
 
 def test_mirror_learns_from_the_action_that_followed():
-    learner = folded(decay=0.0)
+    learner = folded(trace_decay=0.0)
     for reward in (2.0, 3.0, 4.0):
         learner.learn(step(B, 4, reward, C, terminated=True, first=True))
     assert learner.values(B)[4] == pytest.approx(3)  # the mean of all, without a learning rate
@@ -126,19 +126,19 @@ def test_mirror_learns_from_the_action_that_followed():
     assert learner.values(A)[5] == pytest.approx(1 + 0.8 * 3, abs=1e-4)
 
 
-@pytest.mark.parametrize("decay", [0.0, 0.7])
-def test_mirror_solves_the_least_squares_of_all_it_met(decay):
-    rng, learner = np.random.default_rng(0), folded(decay=decay)
+@pytest.mark.parametrize("trace_decay", [0.0, 0.7])
+def test_mirror_solves_the_least_squares_of_all_it_met(trace_decay):
+    rng, learner = np.random.default_rng(0), folded(trace_decay=trace_decay)
     names, matrix, right, trace = {}, np.eye(20) * 1e-6, np.zeros(20), np.zeros(20)
     states = [(2, 0, 0, 0), (2, 1, 0, 0), (2, 0, 1, 0)]  # their own mirror images
     actions = [0, 4, 8]
     walk = [(states[rng.integers(3)], actions[rng.integers(3)]) for _ in range(60)]
     rewards = rng.normal(size=60)
-    for number, (now, following) in enumerate(zip(walk, walk[1:] + walk[:1], strict=True)):
+    for number, (now, next_state) in enumerate(zip(walk, walk[1:] + walk[:1], strict=True)):
         last = number == 59
-        learner.learn(Transition(*now, rewards[number], following[0], last, 0.0, number == 0))
-        one, other = (names.setdefault(key, len(names)) for key in (now, following))
-        trace *= 0.8 * decay
+        learner.learn(Transition(*now, rewards[number], next_state[0], last, 0.0, number == 0))
+        one, other = (names.setdefault(key, len(names)) for key in (now, next_state))
+        trace *= 0.8 * trace_decay
         trace[one] += 1
         slope = np.eye(20)[one] - (0 if last else 0.8) * np.eye(20)[other]
         matrix += np.outer(trace, slope)
@@ -160,7 +160,7 @@ def test_a_mirror_of_a_mirror_is_the_world(percept):
 
 @pytest.mark.parametrize("linear", [False, True])
 def test_back_propagation_is_the_gradient(linear):
-    options = Hyperparameters(rate=0.1, momentum=0.5, spread=1.0)
+    options = Hyperparameters(learning_rate=0.1, momentum=0.5, initial_range=1.0)
     net = Perceptron(options, 6, np.random.default_rng(0), nets=2, linear=linear)
     inputs, target = torch.linspace(0, 1, 6, dtype=torch.float64), 0.3
     for _ in range(2):
@@ -201,17 +201,17 @@ def test_inputs_of_nets():
 @pytest.mark.parametrize("name", ["ann", "ann-linear", "ann-per-action", "elman"])
 def test_a_net_comes_to_know_the_value_of_a_state(name):
     learner = make(name, "simple", gamma=0.5)
-    state, following = (A + learner.context, B + learner.context)
+    state, next_state = (A + learner.context, B + learner.context)
     for _ in range(3000):
-        learner.learn(step(state, 3, 2.0, following, terminated=True))
-        learner.learn(step(state, 4, -2.0, following, terminated=True))
+        learner.learn(step(state, 3, 2.0, next_state, terminated=True))
+        learner.learn(step(state, 4, -2.0, next_state, terminated=True))
     good, bad = learner.values(state)[3:5]
     expected = (2.0, -2.0) if name == "ann-linear" else (0.75, 0.0)  # the paper's mapping of the rewards
     assert (good, bad) == pytest.approx(expected, abs=0.1)
 
 
 def test_a_dqn_comes_to_know_the_value_of_a_way():
-    learner = make("dqn", "simple", gamma=0.5, rate=0.003, rate_end=0.003, sync=50)
+    learner = make("dqn", "simple", gamma=0.5, learning_rate=0.003, learning_rate_end=0.003, target_update_interval=50)
     first, then = (A + learner.context, (*C, 5.0, 2.0))
     for _ in range(600):
         learner.learn(step(first, 3, 0.0, then, first=True))

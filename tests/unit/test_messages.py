@@ -6,11 +6,11 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from phototaxis import messages, wire
-from phototaxis.arena import Arena
-from phototaxis.codec import Decoder, Refused, encode
-from phototaxis.messages import SCHEMA, AgentLog, Command, Control, Message, SensorsLog
-from phototaxis.options import field_help
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.options import field_help
+from phototaxis.wire import document, messages
+from phototaxis.wire.codec import Decoder, Refused, encode
+from phototaxis.wire.messages import SCHEMA, AgentLog, Command, Control, Message, SensorsLog
 
 GOOD = {"run": "r", "tick": 3, "author": "a", "left": 0.5, "right": -1.0}
 decode = Decoder(Command, 200)
@@ -83,7 +83,7 @@ def test_the_fields_of_a_message_are_given_by_keyword(kind):
         kind("r")
 
 
-@pytest.mark.parametrize("kind", wire.structs(*MESSAGES))
+@pytest.mark.parametrize("kind", document.structs(*MESSAGES))
 def test_each_field_has_a_sentence_of_its_own(kind):
     texts = field_help(kind)
     assert texts.keys() == {field.name for field in msgspec.structs.fields(kind)}
@@ -93,12 +93,12 @@ def test_each_field_has_a_sentence_of_its_own(kind):
 
 
 def test_the_structs_of_an_arena_are_among_the_parts_of_messages():
-    assert set(wire.structs(Arena)) < set(wire.structs(*MESSAGES))
+    assert set(document.structs(Arena)) < set(document.structs(*MESSAGES))
 
 
 def test_the_page_about_the_wire_format_is_up_to_date_and_has_no_empty_cell():
     page = PAGE.read_text(encoding="utf-8")
-    assert page == wire.page()
+    assert page == document.page()
     rows = [line for line in page.splitlines() if line.startswith("|")]
     cells = [*chain.from_iterable(row.strip("|").split("|") for row in rows)]
     assert len(cells) > 500

@@ -5,7 +5,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 from phototaxis_sim import arenas
 from phototaxis_sim.physics import Physics, Pose
 from phototaxis_sim.simulation import Simulation

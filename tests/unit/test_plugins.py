@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 from phototaxis_agent.__main__ import read
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab import experiment, train
@@ -88,7 +88,10 @@ def test_a_broken_learner_keeps_no_help_from_being_shown(site: Path, capsys: pyt
     [
         ("--lerner ann", "no option --lerner; did you mean --learner?"),
         ("--epoch 10", "no option --epoch; did you mean --epochs?"),
-        ("--learner mirror --alpha 0.1", "no option --alpha (see phototaxis agent --learner mirror --help)"),
+        (
+            "--learner mirror --learning-rate 0.1",
+            "no option --learning-rate (see phototaxis agent --learner mirror --help)",
+        ),
         ("--learner Mirror", "no learner 'Mirror'; did you mean mirror? there are: ann, "),
         ("--swap 10:mirorr", "no learner 'mirorr'; did you mean mirror?"),
         ("--gamma 0,5", "--gamma 0,5: expected a number, as in 0.75"),

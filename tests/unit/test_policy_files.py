@@ -8,20 +8,20 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
-from phototaxis.arena import Arena
-from phototaxis.checkpoint import decode, encode
-from phototaxis.columns import FLAG, pack, unpack
-from phototaxis.errors import UserError
-from phototaxis.messages import ENDS, Readings, ReadingsOfMany, World
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.checkpoint import decode, encode
+from phototaxis.runtime.errors import UserError
 from phototaxis.task import BatchObservation, Episode
 from phototaxis.task.episode import RESET
-from phototaxis_agent.many import Flock
-from phototaxis_gym.place import Here
+from phototaxis.wire.columns import FLAG, pack, unpack
+from phototaxis.wire.messages import ENDS, BatchReadings, Readings, World
+from phototaxis_agent.batch_driver import BatchDriver
+from phototaxis_gym.backend import LocalBackend
 from phototaxis_gym.policy import PolicyAgent, PolicyFile
 from phototaxis_gym.sb3 import Robots
 from phototaxis_lab import evaluate
-from phototaxis_sensors.crowd import CrowdSuite
-from phototaxis_sim.many import SimulationOfMany
+from phototaxis_sensors.batch_suite import BatchSuite
+from phototaxis_sim.batch_simulation import BatchSimulation
 from sb3_contrib import ARS, QRDQN, TQC, TRPO, CrossQ, MaskablePPO, RecurrentPPO
 from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3
 from stable_baselines3.common.callbacks import EvalCallback
@@ -61,7 +61,7 @@ def agent(file: Path, paper: Arena, **more: Any) -> PolicyAgent:
 
 def drive(agents: list[PolicyAgent], paper: Arena, ticks: int) -> list[list[tuple[float, float, str]]]:
     """The commands of agents that see the same; the first one drives."""
-    place, found = Here(paper), []
+    place, found = LocalBackend(paper), []
     readings = place.begin(5)
     for _ in range(ticks):
         commands = [one(readings) for one in agents]
@@ -134,8 +134,8 @@ def test_a_successor_inherits_the_memory(paper, tmp_path):
 def test_many_robots_are_driven_as_one(paper, tmp_path):
     """In an evaluation: each robot has a memory of its own."""
     file = save(RecurrentPPO, tmp_path, "MlpLstmPolicy")
-    crowd, alone = PolicyFile(file, trusted=True).crowd(paper), agent(file, paper)
-    place, episode = Here(paper), Episode(MAX_STEPS, 2)
+    batch, alone = PolicyFile(file, trusted=True).batch(paper), agent(file, paper)
+    place, episode = LocalBackend(paper), Episode(MAX_STEPS, 2)
     readings = place.begin(5)
     for step in range(8):
         rows = BatchObservation(
@@ -144,20 +144,20 @@ def test_many_robots_are_driven_as_one(paper, tmp_path):
         )  # fmt: skip
         command = alone(readings)
         (episode.step if step else episode.begin)(rows)
-        np.testing.assert_allclose(crowd(episode)[0], (command.left, command.right), atol=1e-6)
+        np.testing.assert_allclose(batch(episode)[0], (command.left, command.right), atol=1e-6)
         readings = place.drive(command.left, command.right)
 
 
 def test_a_policy_drives_the_robots_of_a_world_each_in_its_own_episode(paper, tmp_path):
     file = save(RecurrentPPO, tmp_path, "MlpLstmPolicy")
-    simulation = SimulationOfMany(paper, 5, "x", robots=3)
-    suite, flock = CrowdSuite(simulation.world), Flock(agent(file, paper), 3)
+    simulation = BatchSimulation(paper, 5, "x", robots=3)
+    suite, flock = BatchSuite(simulation.world), BatchDriver(agent(file, paper), 3)
     alone = [agent(file, paper) for _ in range(3)]
     for _ in range(2 * MAX_STEPS):
         state = simulation.state
         sonar, light = suite(state.tick, simulation.poses)
         command = flock(
-            ReadingsOfMany(
+            BatchReadings(
                 run="x", tick=state.tick, epoch=state.epoch, episode=state.episode, sonar=pack(sonar),
                 light=pack(light), contact=state.contact, left=state.left, right=state.right, author="", driver="",
             )

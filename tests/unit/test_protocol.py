@@ -3,14 +3,14 @@
 from pathlib import Path
 
 from making import readings
-from phototaxis.journal import Journal
-from phototaxis.protocol import Once, Question
+from phototaxis.runtime.journal import Journal
+from phototaxis.runtime.protocol import AnswerCache, RetransmitTimer
 from phototaxis_sim.pace import Pace
 
 
 def test_once_answers_a_tick_once_and_repeats_the_answer():
     asked = []
-    once = Once(lambda question: asked.append(question.tick) or f"answer {question.tick}")
+    once = AnswerCache(lambda question: asked.append(question.tick) or f"answer {question.tick}")
     assert [once(readings(tick)) for tick in (0, 0, 1, 0, 1, 2)] == [
         "answer 0", "answer 0", "answer 1", None, "answer 1", "answer 2",
     ]  # fmt: skip
@@ -18,13 +18,13 @@ def test_once_answers_a_tick_once_and_repeats_the_answer():
 
 
 def test_once_begins_anew_with_another_run():
-    once = Once(lambda question: question.run)
+    once = AnswerCache(lambda question: question.run)
     assert once(readings(5, run="a")) == "a"
     assert once(readings(0, run="b")) == "b"
 
 
 def test_a_question_is_repeated_with_growing_pauses():
-    question = Question(first=1, most=4)
+    question = RetransmitTimer(first=1, most=4)
     question.asked(0)
     assert [now for now in range(20) if question.due(now)] == [1, 3, 7, 11, 15, 19]
     question.asked(20)

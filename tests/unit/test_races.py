@@ -7,10 +7,10 @@ from threading import Barrier
 import msgspec
 import numpy as np
 import pytest
-from phototaxis import checkpoint
-from phototaxis.component import made_up
-from phototaxis.errors import UserError
-from phototaxis.messages import World
+from phototaxis.runtime import checkpoint
+from phototaxis.runtime.component import unique_name
+from phototaxis.runtime.errors import UserError
+from phototaxis.wire.messages import World
 from phototaxis_launcher import folder
 from phototaxis_recorder import recordings
 from phototaxis_recorder.file import fresh_file
@@ -67,8 +67,8 @@ def test_a_checkpoint_that_many_write_is_one_of_theirs(tmp_path, setup, paper):
 
 
 def test_names_on_the_bus_differ():
-    assert len({made_up("agent") for _ in range(500)}) == 500
-    assert len(made_up("a-learner-with-a-long-name")) == 24
+    assert len({unique_name("agent") for _ in range(500)}) == 500
+    assert len(unique_name("a-learner-with-a-long-name")) == 24
 
 
 def test_what_somebody_else_has_removed_is_removed(tmp_path, monkeypatch):

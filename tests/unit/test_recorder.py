@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 import rerun as rr
 from disks import no_file_larger_than
-from phototaxis.arena import Arena, Light, Wall
-from phototaxis.messages import AgentLog, EndedEpisode, SensorsLog, SimLog, World
-from phototaxis.ports import free_ports
+from phototaxis.geometry.arena import Arena, Light, Wall
+from phototaxis.runtime.ports import free_ports
 from phototaxis.task import ACTIONS, PERCEPTS
-from phototaxis_recorder import policy
+from phototaxis.wire.messages import AgentLog, EndedEpisode, SensorsLog, SimLog, World
+from phototaxis_recorder import policy_map
 from phototaxis_recorder.colors import of_distance, of_reward
-from phototaxis_recorder.field import CELLS, light_field
+from phototaxis_recorder.field import CELLS_A_SIDE, light_field
 from phototaxis_recorder.file import fresh_file
-from phototaxis_recorder.recordings import DAY_S, MEGABYTE, excess
-from phototaxis_recorder.sinks import Recording
+from phototaxis_recorder.recordings import DAY_S, MEGABYTE_BYTES, excess
+from phototaxis_recorder.sinks import RecordingSinks
 from phototaxis_recorder.summary import RecordingFile, Summary, summary_file
 from phototaxis_recorder.translate import Translator
 from phototaxis_sensors.light import LightModel
-from phototaxis_sensors.model import Past
+from phototaxis_sensors.model import PastMoment
 from phototaxis_sensors.scene import Scene
 from rerun_files import salvaged, series
 
@@ -34,11 +34,11 @@ def test_the_field_is_what_an_eye_there_reads():
         sensing=msgspec.structs.replace(arena.sensing, body_shadow=False),
     )
     field, eye = light_field(arena), LightModel(arena, Scene(arena))
-    assert field.shape == (CELLS, CELLS)
-    cell = 6.0 / CELLS
+    assert field.shape == (CELLS_A_SIDE, CELLS_A_SIDE)
+    cell = 6.0 / CELLS_A_SIDE
     for row, column in ((5, 5), (60, 10), (60, 40), (90, 100), (60, 60)):
         x, y = (column + 0.5) * cell, (row + 0.5) * cell
-        assert field[row, column] == pytest.approx(eye(Past(0, 0, x, y, 0.0))[0], abs=1e-9)
+        assert field[row, column] == pytest.approx(eye(PastMoment(0, 0, x, y, 0.0))[0], abs=1e-9)
     assert field[60, 10] == 0.0, "behind the wall"
 
 
@@ -52,17 +52,17 @@ def test_colours_tell_near_from_far_and_good_from_bad():
 
 @pytest.mark.parametrize("name", ["simple", "rich"])
 def test_each_state_has_its_place_in_the_picture_of_the_policy(name: str):
-    places = policy.cells(PERCEPTS[name].sizes)
+    places = policy_map.cells(PERCEPTS[name].sizes)
     assert len({tuple(place) for place in places.tolist()}) == len(places) == np.prod(PERCEPTS[name].sizes)
     assert (places > 0).all()
-    assert (places < (policy.WIDTH, policy.HEIGHT)).all()
+    assert (places < (policy_map.WIDTH, policy_map.HEIGHT)).all()
 
 
 def test_the_policy_shows_where_it_moves_stands_and_knows_nothing():
     percept = PERCEPTS["simple"]
     table, visits = np.zeros((24, 9)), np.zeros(24, int)
     table[5, ACTIONS.index((1.0, 1.0))], visits[5], visits[6] = 1.0, 3, 1
-    moving, still = policy.arrows(percept, table, visits)
+    moving, still = policy_map.arrows(percept, table, visits)
     assert moving.vectors is not None
     assert still.positions is not None
     assert len(moving.vectors.as_arrow_array()) == 1
@@ -70,14 +70,14 @@ def test_the_policy_shows_where_it_moves_stands_and_knows_nothing():
 
 
 def test_the_arrow_points_where_the_action_drives():
-    assert policy.heading(ACTIONS.index((1.0, 1.0)))[1] < 0, "forward is up"
-    assert policy.heading(ACTIONS.index((-1.0, 1.0)))[0] < 0, "a turn to the left points left"
-    assert policy.heading(ACTIONS.index((0.0, 0.0))) == (0.0, 0.0)
+    assert policy_map.heading(ACTIONS.index((1.0, 1.0)))[1] < 0, "forward is up"
+    assert policy_map.heading(ACTIONS.index((-1.0, 1.0)))[0] < 0, "a turn to the left points left"
+    assert policy_map.heading(ACTIONS.index((0.0, 0.0))) == (0.0, 0.0)
 
 
 def test_old_and_excessive_recordings_go_and_the_one_in_use_stays():
     now = 100.0 * DAY_S
-    found = [RecordingFile(Path(str(age)), 10 * MEGABYTE, now - age * DAY_S, None) for age in (0, 1, 2, 3)]
+    found = [RecordingFile(Path(str(age)), 10 * MEGABYTE_BYTES, now - age * DAY_S, None) for age in (0, 1, 2, 3)]
     assert excess(found, now, None, None) == []
     assert [one.file.name for one in excess(found, now, 1.5, None)] == ["2", "3"]
     assert [one.file.name for one in excess(found, now, None, 25)] == ["2", "3"]
@@ -130,14 +130,14 @@ def moved(first: int, ticks: int) -> SimLog:
 
 
 @pytest.fixture
-def recording(tmp_path: Path, paper: Arena) -> Recording:
+def recording(tmp_path: Path, paper: Arena) -> RecordingSinks:
     """A recording of the run "r" into r.rrd."""
-    return Recording(
+    return RecordingSinks(
         World(run="r", arena=paper, seed=0, epochs=0), tmp_path / "r.rrd", "127.0.0.1", free_ports(1)[0], "16MiB"
     )
 
 
-def record(recording: Recording, until: int) -> None:
+def record(recording: RecordingSinks, until: int) -> None:
     """A hundred ticks at a time."""
     for first in range(0, until, 100):
         recording.translator.sim(moved(first, 100))
@@ -145,7 +145,7 @@ def record(recording: Recording, until: int) -> None:
         recording.keep()
 
 
-def test_a_recording_that_cannot_grow_ends_with_its_summary(recording: Recording, capfd):
+def test_a_recording_that_cannot_grow_ends_with_its_summary(recording: RecordingSinks, capfd):
     record(recording, 100)
     with no_file_larger_than(recording.file.stat().st_size + 30_000):
         record(recording, 3000)
@@ -161,7 +161,7 @@ def test_a_recording_that_cannot_grow_ends_with_its_summary(recording: Recording
     assert not [path for path in recording.file.parent.iterdir() if path.suffix in (".new", ".part")]
 
 
-def test_a_recording_that_never_began_leaves_no_file(recording: Recording):
+def test_a_recording_that_never_began_leaves_no_file(recording: RecordingSinks):
     with no_file_larger_than(20_000):
         record(recording, 300)
         recording.close()
@@ -169,7 +169,7 @@ def test_a_recording_that_never_began_leaves_no_file(recording: Recording):
     assert not list(recording.file.parent.glob("*.rrd"))
 
 
-def test_a_recording_whose_folder_is_gone_says_so(recording: Recording):
+def test_a_recording_whose_folder_is_gone_says_so(recording: RecordingSinks):
     record(recording, 100)
     shutil.rmtree(recording.file.parent)
     record(recording, 200)
@@ -180,13 +180,15 @@ def test_a_recording_whose_folder_is_gone_says_so(recording: Recording):
 
 def test_a_recording_without_a_place_is_a_live_view(tmp_path: Path, paper: Arena):
     wanted = tmp_path / "gone" / "r.rrd"
-    recording = Recording(World(run="r", arena=paper, seed=0, epochs=0), wanted, "127.0.0.1", free_ports(1)[0], "16MiB")
+    recording = RecordingSinks(
+        World(run="r", arena=paper, seed=0, epochs=0), wanted, "127.0.0.1", free_ports(1)[0], "16MiB"
+    )
     record(recording, 100)
     recording.close()
     assert recording.fault == f"{wanted}: No such file or directory; nothing is recorded"
 
 
-def test_low_space_is_told_once(recording: Recording, monkeypatch: pytest.MonkeyPatch, capsys):
+def test_low_space_is_told_once(recording: RecordingSinks, monkeypatch: pytest.MonkeyPatch, capsys):
     monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10**9, 10**9 - 10**7, 10**7))
     record(recording, 300)
     recording.close()

@@ -1,7 +1,7 @@
 """Who drives, who drives next."""
 
 import pytest
-from phototaxis.codec import Refused
+from phototaxis.wire.codec import Refused
 from phototaxis_sim.seat import Seat
 
 

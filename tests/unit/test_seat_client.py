@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 from making import readings
-from phototaxis.machine import Ask, Effect, Say
-from phototaxis.messages import ControlReply, Status
-from phototaxis.seat_client import ASK_EVERY_S, RELEASE, TABLE, Mode, Place, SeatClient, Seen
-from phototaxis.transitions import diagram
+from phototaxis.runtime.machine import Ask, Effect, Say
+from phototaxis.runtime.seat_client import ASK_EVERY_S, RELEASE, TABLE, Mode, Place, SeatClient, Seen
+from phototaxis.runtime.transitions import diagram
+from phototaxis.wire.messages import ControlReply, Status
 
 PAGE = Path(__file__).parents[2] / "ARCHITECTURE.md"
 WAYS = {

@@ -8,19 +8,19 @@ from typing import Any
 
 import msgspec
 import pytest
-from phototaxis.arena import Arena
-from phototaxis.columns import unpack
-from phototaxis.machine import STOP, TIME, Answer, Ask, Effect, Event, Publish, Record, Refuse, Say, Stop
-from phototaxis.messages import SimLog, State, World
-from phototaxis.transitions import diagram
-from phototaxis_sensors.choice import BuiltInChoice, make_suite
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.machine import STOP, TIME, Answer, Ask, Effect, Event, Publish, Record, Refuse, Say, Stop
+from phototaxis.runtime.transitions import diagram
+from phototaxis.wire.columns import unpack
+from phototaxis.wire.messages import SimLog, State, World
+from phototaxis_sensors.choice import BuiltInFactory, make_suite
 from phototaxis_sensors.model import BuiltIn, Moment
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.sensing import TABLE, Sensing
 from phototaxis_sensors.server import chunk
 from phototaxis_sensors.suite import Models, SensorSuite, built_in
 from phototaxis_sim import arenas
-from phototaxis_sim.many import SimulationOfMany
+from phototaxis_sim.batch_simulation import BatchSimulation
 from transitions import assert_all_taken
 
 PAPER = arenas.load("paper")
@@ -31,7 +31,7 @@ NO_WORLD = Event("answer", Answer("world", []))
 class Odometer(BuiltIn):
     """A sonar whose ranges say how often it was asked in this episode, and of which tick before this one."""
 
-    name, remembers = "odometer", True
+    name, stateful = "odometer", True
 
     def __init__(self):
         self.episode, self.ticks, self.anew = -1, list[int](), list[int]()
@@ -46,7 +46,7 @@ class Odometer(BuiltIn):
         self.anew.append(tick)
 
 
-class Remembering(BuiltInChoice):
+class Remembering(BuiltInFactory):
     """Makes suites whose sonar is an odometer."""
 
     def __call__(self, arena: Arena, scene: Scene) -> Models:
@@ -104,8 +104,8 @@ def published(effects: Sequence[Effect]) -> list[int]:
     return [readings.tick for readings in answers(effects)]
 
 
-def sensing(choice: BuiltInChoice | None = None) -> Sensing:
-    return Sensing(partial(make_suite, choice or BuiltInChoice()))
+def sensing(choice: BuiltInFactory | None = None) -> Sensing:
+    return Sensing(partial(make_suite, choice or BuiltInFactory()))
 
 
 def serving() -> Sensing:
@@ -230,18 +230,18 @@ def test_the_first_tick_of_a_run_lacks_no_past():
     assert choice.sonar.anew == []
 
 
-def many(robots: int = 3) -> SimulationOfMany:
-    return SimulationOfMany(QUIET, 3, "r", robots=robots)
+def many(robots: int = 3) -> BatchSimulation:
+    return BatchSimulation(QUIET, 3, "r", robots=robots)
 
 
 def test_many_robots_take_the_same_path():
     machine, found = sensing(), many().state
-    assert play(machine, Event("crowd/state", found)) == [Ask("world", "world")]
+    assert play(machine, Event("batch/state", found)) == [Ask("world", "world")]
     said, answer, record = play(machine, world(robots=3, arena=QUIET))
     assert said == Say("senses in the run r; robots: 3")
     assert isinstance(answer, Publish)
     assert isinstance(record, Record)
-    assert answer.topic == "crowd/readings"
+    assert answer.topic == "batch/readings"
     (readings,) = answers([answer])
     sonar, light = unpack(readings.sonar, 3, 16), unpack(readings.light, 3, 2)
     assert record.row == (0, sonar[:, 0].tolist(), light[:, 0].tolist())
@@ -251,23 +251,23 @@ def test_many_robots_take_the_same_path():
         alone = suite(state(0, x=x[robot], y=y[robot], heading=heading[robot]))
         assert sonar[:, robot] == pytest.approx(alone.sonar, abs=1e-9)
         assert light[:, robot] == pytest.approx(alone.light, abs=1e-9)
-    assert play(machine, Event("crowd/state", found)) == [answer]
+    assert play(machine, Event("batch/state", found)) == [answer]
 
 
 def test_a_state_of_the_wrong_number_of_robots_is_refused():
     machine, found = sensing(), many().state
-    play(machine, Event("crowd/state", found), world(robots=3))
+    play(machine, Event("batch/state", found), world(robots=3))
     other = msgspec.structs.replace(many(2).state, tick=1)
-    (refusal,) = play(machine, Event("crowd/state", other))
+    (refusal,) = play(machine, Event("batch/state", other))
     assert isinstance(refusal, Refuse)
-    assert refusal.topic == "crowd/state"
-    assert published(play(machine, Event("crowd/state", msgspec.structs.replace(found, tick=1)))) == [1]
+    assert refusal.topic == "batch/state"
+    assert published(play(machine, Event("batch/state", msgspec.structs.replace(found, tick=1)))) == [1]
 
 
 def test_a_state_on_the_topic_of_another_number_of_robots_is_of_another_world():
     machine = serving()
     found = msgspec.structs.replace(many().state, tick=1)
-    assert play(machine, Event("crowd/state", found)) == [Ask("world", "world")]
+    assert play(machine, Event("batch/state", found)) == [Ask("world", "world")]
     assert play(machine, world()) == []
     assert published(play(machine, asks(1))) == [1]
 
@@ -290,7 +290,7 @@ def test_rows_become_the_columns_of_a_log():
 class Counted:
     """A suite, and the ticks that it was asked."""
 
-    def __init__(self, choice: BuiltInChoice, message: World):
+    def __init__(self, choice: BuiltInFactory, message: World):
         self.suite, self.ticks = make_suite(choice, message), list[int]()
 
     def __call__(self, asked: State) -> Any:
@@ -306,7 +306,7 @@ def test_whatever_comes_in_whatever_order_each_tick_is_sensed_once(seed: int):
     draw, suites, newest = random.Random(seed), list[Counted](), {"r": 0, "s": 0}
 
     def make(message: World) -> Any:
-        suites.append(Counted(Remembering() if seed % 2 else BuiltInChoice(), message))
+        suites.append(Counted(Remembering() if seed % 2 else BuiltInFactory(), message))
         return suites[-1]
 
     machine, told = Sensing(make), list[tuple[str, int]]()

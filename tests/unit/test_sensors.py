@@ -6,10 +6,10 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from phototaxis.arena import Arena, Light, Wall
-from phototaxis.errors import UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import World
+from phototaxis.geometry.arena import Arena, Light, Wall
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.wire.messages import World
 from phototaxis_sensors import choice
 from phototaxis_sensors.noise import uniform
 from phototaxis_sensors.suite import SensorSuite
@@ -86,8 +86,8 @@ def test_noise_does_not_change_between_versions():
 
 def test_models_of_an_installed_package_are_found_by_its_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "blind_models.py").write_text(
-        "from phototaxis_sensors.choice import BuiltInChoice\n"
-        "class Blind(BuiltInChoice):\n"
+        "from phototaxis_sensors.choice import BuiltInFactory\n"
+        "class Blind(BuiltInFactory):\n"
         "    closed = []\n"
         "    def __init__(self, options, one_cpu): self.file = options.light_fmu\n"
         "    def try_out(self): assert self.file == 'some.fmu'\n"
@@ -99,13 +99,13 @@ def test_models_of_an_installed_package_are_found_by_its_entry_point(tmp_path: P
     (about / "entry_points.txt").write_text("[phototaxis.sensors]\nfmu = blind_models:Blind\nbroken = blind_gone:Any\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(choice, "entry_points", lambda group: Distribution.at(about).entry_points.select(group=group))
-    with choice.choose(FmuOptions(light_fmu="some.fmu")) as models:
+    with choice.choose_sensors(FmuOptions(light_fmu="some.fmu")) as models:
         assert type(models).__name__ == "Blind"
         closed: list[object] = vars(type(models))["closed"]
         assert not closed
     assert closed == [models]
-    with choice.choose(FmuOptions()) as models:
-        assert type(models) is choice.BuiltInChoice
+    with choice.choose_sensors(FmuOptions()) as models:
+        assert type(models) is choice.BuiltInFactory
     with pytest.raises(UserError, match=r"'broken' need the package blind_gone; install it .*'phototaxis\[broken\]'"):
         choice.provider("broken")
     with pytest.raises(UserError, match=r"of the kind 'brokn'; did you mean broken\? there are: fmu, b"):

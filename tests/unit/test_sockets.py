@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 import zenoh
-from phototaxis import session, sockets
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.options import parse
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime import session, sockets
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.session import BusOptions, open_session
 
-WHOLE = sockets.LONGEST_PATH - sockets.LONGEST_SOCKET
+WHOLE = sockets.MAX_PATH_BYTES - sockets.MAX_SOCKET_NAME_BYTES
 
 
 @pytest.fixture

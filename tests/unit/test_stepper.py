@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from phototaxis.machine import (
+from phototaxis.runtime.machine import (
     START,
     STOP,
     TIME,
@@ -28,8 +28,8 @@ from phototaxis.machine import (
     Unwritten,
     Warn,
 )  # fmt: skip
-from phototaxis.messages import Command, Control, ControlReply, Recorded, State, Status
-from phototaxis.transitions import diagram
+from phototaxis.runtime.transitions import diagram
+from phototaxis.wire.messages import Command, Control, ControlReply, RecordingProgress, State, Status
 from phototaxis_sim import arenas
 from phototaxis_sim.continued import Continued, continued
 from phototaxis_sim.pace import Pace
@@ -45,10 +45,12 @@ PERIOD = PAPER.motion.control_period
 class Desk:
     """A machine with a clock that is wound by hand, and all that came out of it."""
 
-    def __init__(self, epochs: int = 0, speed: float = 0.0, patience: float = 5.0, found: Continued | None = None):
+    def __init__(
+        self, epochs: int = 0, speed: float = 0.0, driver_timeout: float = 5.0, found: Continued | None = None
+    ):
         suffixes = count()
         fresh = Simulation(PAPER, 3, "r", epochs)
-        self.machine = Stepper(fresh, Pace(PERIOD, speed), lambda: f"{next(suffixes):04x}", found, patience)
+        self.machine = Stepper(fresh, Pace(PERIOD, speed), lambda: f"{next(suffixes):04x}", found, driver_timeout)
         self.now, self.all = 0.0, list[Effect]()
         self.out = self.give(START)
 
@@ -210,7 +212,7 @@ def test_a_simulation_that_is_asked_to_stop_waits_for_the_answer_but_not_for_lon
 
 
 def test_a_silent_driver_loses_the_seat_to_who_waits_for_it():
-    desk = seated(patience=1.0)
+    desk = seated(driver_timeout=1.0)
     desk.wait(5)
     assert desk.status().driver == "a"
     desk.ask("stand by", "b")
@@ -285,7 +287,7 @@ def test_a_journal_of_another_run_continues_nothing_and_one_begun_by_request_its
 
 def test_a_journal_that_cannot_be_written_is_told_until_the_next_episode():
     desk = seated()
-    assert kinds(desk.give(Event("unwritten", Unwritten("journal", "j: no space left")))) == [Warn]
+    assert kinds(desk.give(Event("write_failure", Unwritten("journal", "j: no space left")))) == [Warn]
     assert "cannot be continued" in desk.status().warnings[0]
     desk.command(end="truncated")
     assert desk.status().warnings == []
@@ -301,7 +303,7 @@ def test_the_status_tells_what_is_missing_and_what_the_recorder_warns_of():
     assert desk.status().phase == "running"
     desk.wait(1.0)
     assert desk.status().waiting_for == "the command of a"
-    desk.give(Event("recording", Recorded(run="r", tick=1, warning="little space")))
+    desk.give(Event("recording", RecordingProgress(run="r", tick=1, warning="little space")))
     assert desk.status().warnings == ["little space"]
 
 
@@ -407,7 +409,7 @@ def test_a_command_of_a_former_driver_is_not_applied():
 
 def test_patience_ends_at_its_deadline_whatever_the_clock_shows():
     for began in range(1, 1000):
-        desk = Desk(patience=0.1)
+        desk = Desk(driver_timeout=0.1)
         desk.now = began / 7
         desk.ask("claim", "a")
         desk.ask("stand by", "b")

@@ -10,8 +10,8 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
-from phototaxis.roles import COMPONENTS, ROLES
-from phototaxis.topics import TOPICS, table
+from phototaxis.runtime.roles import COMPONENTS, ROLES
+from phototaxis.wire.topics import TOPICS, table
 from phototaxis_launcher.cli import VERBS
 
 ROOT = Path(__file__).parents[2]

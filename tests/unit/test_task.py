@@ -6,7 +6,6 @@ from itertools import product
 import numpy as np
 import pytest
 from making import readings
-from phototaxis.messages import Readings
 from phototaxis.task import (
     ACTIONS,
     FORWARD,
@@ -20,6 +19,7 @@ from phototaxis.task import (
     at_goal,
     state_number,
 )
+from phototaxis.wire.messages import Readings
 
 
 def sonar(**near: float) -> list[float]:

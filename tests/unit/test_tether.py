@@ -4,8 +4,8 @@ import subprocess
 import sys
 
 HELD = """
-from phototaxis import component
-component.ORDERLY = 0.01
+from phototaxis.runtime import component
+component.ORDERLY_END_S = 0.01
 component._hold_tether(lambda: print("asked to stop", flush=True))
 """
 

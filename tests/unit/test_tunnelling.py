@@ -6,10 +6,10 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from phototaxis.arena import Arena, Disc, Light, Motion, Placement, Robot, Wall
-from phototaxis.strides import strides
+from phototaxis.geometry.arena import Arena, Disc, Light, Motion, Placement, Robot, Wall
+from phototaxis.geometry.substeps import substeps
 from phototaxis_sim import arenas
-from phototaxis_sim.crowd import Crowd
+from phototaxis_sim.batch_physics import BatchPhysics
 from phototaxis_sim.physics import Physics, Pose
 
 Outline = list[tuple[float, float]]
@@ -65,16 +65,16 @@ def test_nobody_leaves_a_closed_cell(collision, count, seed):
     rng, physics = np.random.default_rng(seed), Physics(arena)
     starts = [physics.random_pose(rng) for _ in range(count)]
     physics.place(starts[0])
-    crowd, within = Crowd(arena, starts), [inside(outline, *start[:2]) for start in starts]
+    batch, within = BatchPhysics(arena, starts), [inside(outline, *start[:2]) for start in starts]
     motors = np.ones((2, count))
     for _ in range(20):
         motors = np.where(rng.random(count) < 0.4, rng.choice([-1.0, 0.3, 1.0, 1.0], (2, count)), motors)
-        crowd.drive(*motors)
+        batch.drive(*motors)
         alone = physics.drive(*motors[:, 0].tolist()).pose
         assert inside(outline, alone.x, alone.y) == within[0]
-        assert [inside(outline, x, y) for x, y, _ in crowd.poses.tolist()] == within
-        assert (crowd.poses[:, :2] > 0).all()
-        assert (crowd.poses[:, :2] < 10).all()
+        assert [inside(outline, x, y) for x, y, _ in batch.poses.tolist()] == within
+        assert (batch.poses[:, :2] > 0).all()
+        assert (batch.poses[:, :2] < 10).all()
 
 
 @pytest.mark.parametrize("collision", ["contact", "stall"])
@@ -101,35 +101,35 @@ def test_a_wall_between_two_halves_is_closed(collision, case):
 def test_hurried_robots_together_move_as_each_would_alone():
     arena, rng = walled("contact", thickness=0.03, step=0.25, speed=3.0, turn=4.0), np.random.default_rng(2)
     physics = Physics(arena)
-    crowd = Crowd(arena, [physics.random_pose(rng) for _ in range(COUNT)])
+    batch = BatchPhysics(arena, [physics.random_pose(rng) for _ in range(COUNT)])
     alone = [Physics(arena) for _ in range(COUNT)]
-    for one, pose in zip(alone, crowd.poses.tolist(), strict=True):
+    for one, pose in zip(alone, batch.poses.tolist(), strict=True):
         one.place(Pose(*pose))
     for _ in range(8):
         motors = rng.choice([-1.0, 1.0, 1.0], (2, COUNT))
-        crowd.drive(*motors)
+        batch.drive(*motors)
         motions = [one.drive(*command) for one, command in zip(alone, motors.T.tolist(), strict=True)]
-        difference = crowd.poses - [motion.pose for motion in motions]
+        difference = batch.poses - [motion.pose for motion in motions]
         difference[:, 2] = np.remainder(difference[:, 2] + math.pi, math.tau) - math.pi
         assert np.abs(difference).max() < 1e-9
-        assert crowd.front.tolist() == [motion.front for motion in motions]
-        assert crowd.rear.tolist() == [motion.rear for motion in motions]
+        assert batch.front.tolist() == [motion.front for motion in motions]
+        assert batch.rear.tolist() == [motion.rear for motion in motions]
 
 
 def test_a_stride_that_a_contact_takes_astray_is_undone(paper: Arena):
     against = Pose(9.775, 5.0, 0.3)
-    physics, crowd = Physics(paper), Crowd(paper, [against, Pose(5.0, 5.0, 0.0)])
+    physics, batch = Physics(paper), BatchPhysics(paper, [against, Pose(5.0, 5.0, 0.0)])
     physics.place(against)
     physics.drive(1.0, 1.0)
-    crowd.drive(np.ones(2), np.ones(2))
-    physics._furthest = crowd._furthest = 0.0  # nobody in contact may be moved at all
-    before = physics.drive(0.0, 0.0).pose, crowd.poses.copy()
+    batch.drive(np.ones(2), np.ones(2))
+    physics._max_move = batch._max_move = 0.0  # nobody in contact may be moved at all
+    before = physics.drive(0.0, 0.0).pose, batch.poses.copy()
     motion = physics.drive(1.0, 1.0)
-    crowd.drive(np.ones(2), np.array([1.0, -1.0]))
+    batch.drive(np.ones(2), np.array([1.0, -1.0]))
     assert motion.pose == before[0]
     assert motion.front
-    assert crowd.poses[0].tolist() == before[1][0].tolist()
-    assert crowd.poses[1, 2] == pytest.approx(before[1][1, 2] - 0.5)
+    assert batch.poses[0].tolist() == before[1][0].tolist()
+    assert batch.poses[1, 2] == pytest.approx(before[1][1, 2] - 0.5)
 
 
 def test_no_light_sensor_comes_out_behind_a_thin_wall():
@@ -144,7 +144,7 @@ def test_no_light_sensor_comes_out_behind_a_thin_wall():
 
 @pytest.mark.parametrize("name", arenas.shipped())
 def test_shipped_arenas_are_driven_as_ever(name):
-    assert strides(arenas.load(name)) == 1
+    assert substeps(arenas.load(name)) == 1
 
 
 @pytest.mark.parametrize(

@@ -3,19 +3,19 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from phototaxis.bus import Bus
-from phototaxis.checkpoint import load
-from phototaxis.component import ComponentOptions, entry, run
-from phototaxis.disk import try_file
-from phototaxis.errors import UserError
-from phototaxis.messages import Count, Seed, World
-from phototaxis.seat_client import Mode
-from phototaxis.seated import SeatedAgent
-from phototaxis.session import WorldNames
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.checkpoint import load
+from phototaxis.runtime.component import ComponentOptions, entry, run
+from phototaxis.runtime.disk import check_writable
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.seat_client import Mode
+from phototaxis.runtime.seated import SeatedAgent
+from phototaxis.runtime.session import WorldNames
+from phototaxis.wire.messages import Count, Seed, World
 
 from phototaxis_agent.policies import load_policy
 from phototaxis_agent.server import serve
-from phototaxis_agent.setup import Setup, parse_setup
+from phototaxis_agent.setup import AgentSetup, parse_setup
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -43,7 +43,7 @@ class Options(ComponentOptions, kw_only=True):
     """seed of the learner and its exploration (default: the run's)"""
 
 
-def read(argv: Sequence[str] | None, others: Iterable[str] = ()) -> tuple[Options, Setup]:
+def read(argv: Sequence[str] | None, others: Iterable[str] = ()) -> tuple[Options, AgentSetup]:
     """The options and the agent of a command line, checked as far as that is possible without a world.
 
     `others` are options that a mistyped one may have meant. `phototaxis up` calls this before it starts anything.
@@ -71,8 +71,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     worlds = options.worlds.split(",") if options.worlds else []
     kept = Path(options.checkpoint) if options.checkpoint else None
     for file in [] if kept is None else [kept / f"{name}.npz" for name in worlds] or [kept]:
-        try_file(file, "--checkpoint")
-        try_file(file.with_suffix(".journal"), "--checkpoint")
+        check_writable(file, "--checkpoint")
+        check_writable(file.with_suffix(".journal"), "--checkpoint")
     mode: Mode = "take over" if options.take_over else "stand by" if options.standby else "claim"
 
     policy = load_policy(Path(options.policy), options.trust, options.normalize) if options.policy else None

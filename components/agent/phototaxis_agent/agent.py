@@ -3,11 +3,11 @@
 from typing import Self
 
 import numpy as np
-from phototaxis.arena import Arena
-from phototaxis.checkpoint import Meta
-from phototaxis.messages import Readings
-from phototaxis.seated import SeatedAgent, Step
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.checkpoint import CheckpointMetadata
+from phototaxis.runtime.seated import SeatedAgent, Step
 from phototaxis.task import ACTIONS, PerceptState, action_of
+from phototaxis.wire.messages import Readings
 
 from phototaxis_agent.policy import Policy
 
@@ -61,14 +61,14 @@ class Agent(SeatedAgent):
     def current(self) -> list[float]:
         return self.policy.row(self._state) if self._state else [0.0] * len(ACTIONS)
 
-    def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
+    def checkpoint(self) -> tuple[CheckpointMetadata, dict[str, np.ndarray]]:
         fields, arrays = self.policy.save()
         return self._meta(arrays, state=self._state, linked=self._linked, **fields), arrays
 
     def prove(self, arrays: dict[str, np.ndarray]) -> None:
         self.learner.prove(arrays)
 
-    def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
+    def restore(self, meta: CheckpointMetadata, arrays: dict[str, np.ndarray], source: str) -> None:
         """Continue from a checkpoint, bit for bit.
 
         Raises

@@ -2,19 +2,19 @@
 
 from typing import Any, NamedTuple
 
-from phototaxis.errors import UserError
-from phototaxis.messages import World
-from phototaxis.protocol import Once
-from phototaxis.seat_client import Mode
-from phototaxis.seated import SeatedAgent
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.protocol import AnswerCache
+from phototaxis.runtime.seat_client import Mode
+from phototaxis.runtime.seated import SeatedAgent
+from phototaxis.wire.messages import World
 
-from phototaxis_agent.many import Flock
+from phototaxis_agent.batch_driver import BatchDriver
 
 
 class Answering(NamedTuple):
     """An agent at the ticks of one world."""
 
-    once: Once[Any]
+    once: AnswerCache[Any]
     whole: bool
     """Whether the agent's checkpoint holds everything that its next answer depends on. Then a journal can continue
     it, and a successor can be its equal; of many robots it holds what was learned, not what each one remembers."""
@@ -23,8 +23,8 @@ class Answering(NamedTuple):
 def answering(world: World, agent: SeatedAgent) -> Answering:
     """What answers each tick of a world once, from the agent's last answer on."""
     if world.robots > 1:
-        return Answering(Once(Flock(agent, world.robots)), whole=False)
-    return Answering(Once(agent, agent.tick, agent.command), whole=True)
+        return Answering(AnswerCache(BatchDriver(agent, world.robots)), whole=False)
+    return Answering(AnswerCache(agent, agent.tick, agent.command), whole=True)
 
 
 def refuse_mode(world: World, mode: Mode) -> None:

@@ -7,8 +7,8 @@ from copy import copy
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
-from phototaxis.checkpoint import learner_hash, storable
-from phototaxis.errors import ComponentFailed, UserError
+from phototaxis.runtime.checkpoint import learner_hash, storable
+from phototaxis.runtime.errors import ComponentFailed, UserError
 from phototaxis.task import Percept, PerceptState
 
 from phototaxis_agent.learner import Learner, Transition
@@ -90,11 +90,11 @@ class CheckedLearner(Learner):
             return tuple(self._of_many(one, gain.shape) for one in context)
         return context if _plain(context) else self._context("remember()", context, state)
 
-    def values_of(self, states: np.ndarray) -> np.ndarray:
-        if self._kind.values_of is Learner.values_of:
-            return super().values_of(states)
-        values = self._call("values_of()", None, lambda: self._learner.values_of(states.copy()))
-        return self._numbers("values_of()", values, (len(states), self._actions))
+    def batch_values(self, states: np.ndarray) -> np.ndarray:
+        if self._kind.batch_values is Learner.batch_values:
+            return super().batch_values(states)
+        values = self._call("batch_values()", None, lambda: self._learner.batch_values(states.copy()))
+        return self._numbers("batch_values()", values, (len(states), self._actions))
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything learned, as arrays of its own that a checkpoint can hold."""

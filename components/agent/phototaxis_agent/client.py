@@ -5,11 +5,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from phototaxis.codec import Refused
-from phototaxis.machine import Answer, Ask, Effect, Event, Flush, Publish, Refuse, Reply, Say, Stop
-from phototaxis.messages import CheckpointRequest, Readings, ReadingsOfMany, World
-from phototaxis.seat_client import RELEASE, SEAT, Mode, Place, SeatClient, Seen
-from phototaxis.seated import SeatedAgent
+from phototaxis.runtime.machine import Answer, Ask, Effect, Event, Flush, Publish, Refuse, Reply, Say, Stop
+from phototaxis.runtime.seat_client import RELEASE, SEAT, Mode, Place, SeatClient, Seen
+from phototaxis.runtime.seated import SeatedAgent
+from phototaxis.wire.codec import Refused
+from phototaxis.wire.messages import BatchReadings, CheckpointRequest, Readings, World
 
 from phototaxis_agent.answering import refuse_mode
 from phototaxis_agent.following import bequest
@@ -57,19 +57,19 @@ class AgentClient:
         self.seat = SeatClient(ident, mode, at)
         self._make, self._kept, self._keeping = make, kept, Keeping(keeps, kept)
         self._session: Session | None = None
-        self._waiting: deque[Readings | ReadingsOfMany] = deque(maxlen=MAX_WAITING)
+        self._waiting: deque[Readings | BatchReadings] = deque(maxlen=MAX_WAITING)
         self._asks_world = False
 
     def on(self, event: Event, now: float) -> list[Effect]:
         """What follows from an event."""
-        if event.topic in ("readings", "crowd/readings"):
+        if event.topic in ("readings", "batch/readings"):
             return self._readings(event.message, now)
         if event.topic == "answer":
             return self._answer(event.message, now)
         if event.topic == "checkpoint":
             return self._bequeath(event)
-        if event.topic == "unwritten":
-            return self._keeping.unwritten(event.message, self.agent, now)
+        if event.topic == "write_failure":
+            return self._keeping.write_failure(event.message, self.agent, now)
         if event.topic == "time" and self._session is not None:
             return self._session.following.again(now)
         if event.topic == "alive" and event.message[0] == "sim":
@@ -86,7 +86,7 @@ class AgentClient:
         """The agent, once it has joined a run."""
         return None if self._session is None else self._session.agent
 
-    def _readings(self, readings: Readings | ReadingsOfMany, now: float) -> list[Effect]:
+    def _readings(self, readings: Readings | BatchReadings, now: float) -> list[Effect]:
         """One tick: of a known run it is taken at once, unless a question that matters is out."""
         session = self._session
         if self.seat.place is Place.LEAVING:
@@ -105,7 +105,7 @@ class AgentClient:
         following, place = session.following, self.seat.place
         return following.inherits or (following.probes and place not in (Place.IN_STEP, Place.DRIVING))
 
-    def _wait(self, readings: Readings | ReadingsOfMany) -> None:
+    def _wait(self, readings: Readings | BatchReadings) -> None:
         if not self._waiting or self._waiting[-1] != readings:
             self._waiting.append(readings)
 
@@ -115,7 +115,7 @@ class AgentClient:
         self._waiting.clear()
         return [effect for readings in waiting for effect in self._readings(readings, now)]
 
-    def _tick(self, session: Session, readings: Readings | ReadingsOfMany, now: float) -> list[Effect]:
+    def _tick(self, session: Session, readings: Readings | BatchReadings, now: float) -> list[Effect]:
         if self.seat.stale(readings):
             return []
         before, inherits = self.seat.place, self.seat.mode != "claim"
@@ -136,7 +136,7 @@ class AgentClient:
                 effects += self._follow(session, readings, now, fresh)
         return effects
 
-    def _sit(self, session: Session, readings: Readings | ReadingsOfMany, now: float, equal: bool) -> list[Effect]:
+    def _sit(self, session: Session, readings: Readings | BatchReadings, now: float, equal: bool) -> list[Effect]:
         """Begin to drive. An agent that does not equal its predecessor first asks it for what it knows."""
         said = Say(f"drives from tick {readings.tick} on")
         predecessor = session.following.predecessor_at(readings)
@@ -162,7 +162,7 @@ class AgentClient:
             effects += self._learn(session, readings, now)[0]
         return effects
 
-    def _drive(self, session: Session, readings: Readings | ReadingsOfMany, now: float) -> list[Effect]:
+    def _drive(self, session: Session, readings: Readings | BatchReadings, now: float) -> list[Effect]:
         """Answer one tick; nobody hears the answer before the journal has what led to it."""
         agent = session.agent
         fresh = (readings.run, readings.tick) != agent.tick

@@ -4,10 +4,10 @@ from typing import Any
 
 from phototaxis.task import ACTIONS, MIRRORED, Percept, PerceptState
 
-SIZES = (len(ACTIONS) + 1, 3)
+CONTEXT_SIZES = (len(ACTIONS) + 1, 3)
 """Number of values: the action + 1 (0 for none of the nine), and the trend (0 darker, 1 the same, 2 brighter)."""
 
-BLANK = (0.0, 1.0)
+INITIAL_CONTEXT = (0.0, 1.0)
 """At the first step of an episode."""
 
 

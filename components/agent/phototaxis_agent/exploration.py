@@ -9,21 +9,25 @@ from msgspec import Meta, Struct
 class Exploration(Struct, frozen=True, kw_only=True):
     """How actions are drawn, and how the draw gets greedier.
 
-    The temperature falls geometrically from `hot` to `cold` over the share `cooling` of the budget and
-    stays there.
+    The temperature falls geometrically from `temperature_start` to `temperature_end` over the share
+    `exploration_fraction` of the budget and stays there.
     """
 
-    hot: Annotated[float, Meta(gt=0, le=100)] = 0.1
+    temperature_start: Annotated[float, Meta(gt=0, le=100)] = 0.1
     """temperature T of equation 2 at the first epoch"""
-    cold: Annotated[float, Meta(gt=0, le=100)] = 0.05
+    temperature_end: Annotated[float, Meta(gt=0, le=100)] = 0.05
     """temperature T at the end, and while a policy is evaluated"""
-    cooling: Annotated[float, Meta(gt=0, le=1)] = 0.7
-    """share of the epochs after which the temperature has reached `cold`"""
+    exploration_fraction: Annotated[float, Meta(gt=0, le=1)] = 0.7
+    """share of the epochs after which the temperature has reached `temperature_end`"""
 
     def temperature(self, epoch: int, budget: int) -> float:
         """T at an epoch of a budget of epochs."""
-        progress = epoch / (self.cooling * budget) if budget else 1.0
-        return self.cold if progress >= 1 else self.hot * (self.cold / self.hot) ** progress
+        progress = epoch / (self.exploration_fraction * budget) if budget else 1.0
+        return (
+            self.temperature_end
+            if progress >= 1
+            else self.temperature_start * (self.temperature_end / self.temperature_start) ** progress
+        )
 
 
 def draw(values: list[float], temperature: float, uniform: float) -> int:

@@ -3,11 +3,11 @@
 import math
 from typing import Literal
 
-from phototaxis.checkpoint import decode, encode
-from phototaxis.errors import UserError
-from phototaxis.machine import Answer, Ask, Effect, Say
-from phototaxis.messages import CheckpointReply, CheckpointRequest, Readings, ReadingsOfMany
-from phototaxis.seated import SeatedAgent
+from phototaxis.runtime.checkpoint import decode, encode
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.machine import Answer, Ask, Effect, Say
+from phototaxis.runtime.seated import SeatedAgent
+from phototaxis.wire.messages import BatchReadings, CheckpointReply, CheckpointRequest, Readings
 
 INHERIT_WITHIN_S = 4.0
 """How long a predecessor gets to hand over what it knows; so long a standby waits before it begins again."""
@@ -48,7 +48,7 @@ class Following:
         """Whether an agent is being asked for everything that it knows."""
         return self._asked is not None and not self._probe
 
-    def see(self, readings: Readings | ReadingsOfMany) -> bool:
+    def see(self, readings: Readings | BatchReadings) -> bool:
         """Note the driver that the readings name; return whether it is a new leader."""
         self._named = readings.driver
         fresh = readings.driver != self.leader and readings.author == readings.driver
@@ -75,7 +75,7 @@ class Following:
         self.again_at = now + ASK_AGAIN_S if left > ASK_AGAIN_S else math.inf
         return [self._asked._replace(timeout=left)] if left > 0 else []
 
-    def predecessor_at(self, readings: Readings | ReadingsOfMany) -> str:
+    def predecessor_at(self, readings: Readings | BatchReadings) -> str:
         """Whom to inherit from when we sit down: the author of the last command, who alone surely knows all before it.
 
         A driver that was named but has not driven has nothing of its own. "" for nobody: we have driven last.

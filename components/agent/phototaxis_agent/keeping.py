@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-from phototaxis.checkpoint import Meta
-from phototaxis.errors import Unavailable
-from phototaxis.journal import GIVEN_UP
-from phototaxis.machine import Append, Begin, Effect, Save, Unwritten, Warn
-from phototaxis.messages import Readings
-from phototaxis.seated import SeatedAgent
+from phototaxis.runtime.checkpoint import CheckpointMetadata
+from phototaxis.runtime.errors import Unavailable
+from phototaxis.runtime.journal import GIVEN_UP
+from phototaxis.runtime.machine import Append, Begin, Effect, Save, Unwritten, Warn
+from phototaxis.runtime.seated import SeatedAgent
+from phototaxis.wire.messages import Readings
 
 SAVE_EVERY_S = 10.0
 
@@ -20,7 +20,7 @@ class Kept(NamedTuple):
 
     source: str = ""
     """The checkpoint's file, for messages."""
-    checkpoint: tuple[Meta, dict[str, np.ndarray]] | None = None
+    checkpoint: tuple[CheckpointMetadata, dict[str, np.ndarray]] | None = None
     journal: str = ""
     frames: list[bytes] = []  # noqa: RUF012 - never changed
     """The journal's header, a run, and entries, readings; empty where there is none to continue."""
@@ -74,7 +74,7 @@ class Keeping:
         self._saved = agent.tick
         return [Save(meta, arrays, agent.tick[0].encode(), last)]
 
-    def unwritten(self, what: Unwritten, agent: SeatedAgent | None, now: float) -> list[Effect]:
+    def write_failure(self, what: Unwritten, agent: SeatedAgent | None, now: float) -> list[Effect]:
         """The disk did not take something: warn, and replace a journal that was given up by a checkpoint."""
         again = what.what == "journal" and agent is not None and agent.tick != self._saved
         self._saved = None

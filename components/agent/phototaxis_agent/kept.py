@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from phototaxis.checkpoint import load
-from phototaxis.disk import unwritten
-from phototaxis.journal import Journal
+from phototaxis.runtime.checkpoint import load
+from phototaxis.runtime.disk import write_failure
+from phototaxis.runtime.journal import Journal
 
 from phototaxis_agent.keeping import Kept
 
@@ -31,5 +31,5 @@ def read(resume: Path | None, required: bool, journal: Journal | None) -> Kept:
         if frames:
             journal.resume(frames)
     except OSError as error:
-        raise unwritten(journal.path, error) from None
+        raise write_failure(journal.path, error) from None
     return Kept(str(resume), checkpoint, str(journal.path), frames)

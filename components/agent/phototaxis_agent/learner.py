@@ -7,13 +7,13 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from msgspec import Struct
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.phrases import known, told
 from phototaxis.task import PERCEPTS, Percept, PerceptState
-from phototaxis.words import known, told
 
-GROUP = "phototaxis.learners"
-POLICIES = "phototaxis.policies"
-HINTS = {GROUP: "'phototaxis[agent]'", POLICIES: "'phototaxis[gym]' stable-baselines3"}
+LEARNER_GROUP = "phototaxis.learners"
+POLICY_GROUP = "phototaxis.policies"
+INSTALL_HINTS = {LEARNER_GROUP: "'phototaxis[agent]'", POLICY_GROUP: "'phototaxis[gym]' stable-baselines3"}
 """What brings the packages that our own entry points need."""
 
 
@@ -24,7 +24,7 @@ class Transition(NamedTuple):
     action: int
     """Index into `phototaxis.task.ACTIONS`."""
     reward: float
-    following: PerceptState
+    next_state: PerceptState
     terminated: bool
     """The light was reached: nothing follows. (An episode cut short is not terminated.)"""
     progress: float
@@ -73,7 +73,7 @@ class Learner:
         """
         return ()
 
-    def values_of(self, states: np.ndarray) -> np.ndarray:
+    def batch_values(self, states: np.ndarray) -> np.ndarray:
         """`values` of many states, (N, variables) → (N, actions); override it where that can be quicker."""
         rows, which = np.unique(states, axis=0, return_inverse=True)
         return np.array([self.values(tuple(row)) for row in rows.tolist()])[which.reshape(-1)]
@@ -93,7 +93,7 @@ def discrete(percept: Percept) -> Percept:
     return percept
 
 
-def falling(first: float, last: float, progress: float) -> float:
+def annealed(first: float, last: float, progress: float) -> float:
     """A rate that falls geometrically from `first` to `last` while the budget is used up."""
     return first * (last / first) ** progress
 
@@ -112,12 +112,12 @@ def stored_rows(arrays: dict[str, np.ndarray], name: str, width: int) -> np.ndar
     return stored(arrays, name, np.empty((len(arrays.get(name, ())), width)))
 
 
-def available() -> dict[str, EntryPoint]:
+def available_learners() -> dict[str, EntryPoint]:
     """The learners that are installed, by name."""
-    return {point.name: point for point in sorted(entry_points(group=GROUP))}
+    return {point.name: point for point in sorted(entry_points(group=LEARNER_GROUP))}
 
 
-def find(name: str) -> type[Learner]:
+def find_learner(name: str) -> type[Learner]:
     """The learner class called `name`.
 
     Raises
@@ -125,7 +125,7 @@ def find(name: str) -> type[Learner]:
     UserError
         when there is none (it lists those that exist), it cannot be loaded, or is not a learner.
     """
-    points = available()
+    points = available_learners()
     if name not in points:
         raise UserError(f"no learner '{name}'; {known(name, points)}")
     kind = load_point(points[name], f"the learner '{name}'")
@@ -159,5 +159,5 @@ def load_point(point: EntryPoint, what: str) -> Any:
         module = sys.modules.get(point.module) or PathFinder.find_spec(point.module)
         file = getattr(module, "__file__", None) or getattr(module, "origin", None)
         ours = isinstance(error, ModuleNotFoundError) and point.dist is not None and point.dist.name == "phototaxis"
-        hint = f"; install it with: pip install {HINTS[point.group]}" if ours else ""
+        hint = f"; install it with: pip install {INSTALL_HINTS[point.group]}" if ours else ""
         raise UserError(f"{what} cannot be loaded from {point.value}: {told(error, file)}{hint}") from None

@@ -16,23 +16,29 @@ from phototaxis_agent.learner import stored
 class Hyperparameters(Struct, frozen=True, kw_only=True):
     """Of a net and of what it learns."""
 
-    alpha: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    target_rate: Annotated[float, Meta(gt=0, le=1)] = 1.0
     """α of equation 1: how far the target lies from the present Q towards r + γ max Q"""
     gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.75
     """discount factor γ of equation 1"""
-    rate: Annotated[float, Meta(gt=0, le=10)] = 0.1
+    learning_rate: Annotated[float, Meta(gt=0, le=10)] = 0.1
     """learning rate of back-propagation (conx: 0.1)"""
     momentum: Annotated[float, Meta(ge=0, lt=1)] = 0.9
     """share of the last change of weights that is made again (conx: 0.9)"""
     hidden: Annotated[int, Meta(ge=1, le=1000)] = 4
     """hidden units"""
-    spread: Annotated[float, Meta(gt=0, le=10)] = 0.1
+    initial_range: Annotated[float, Meta(gt=0, le=10)] = 0.1
     """weights and biases begin uniform in ± this (conx: 0.1)"""
 
 
 PRESETS: dict[str, dict[str, Any]] = {
-    "": {"gamma": 0.9, "hot": 0.03, "cold": 0.01, "rate": 0.3},
-    "rich": {"gamma": 0.3, "hot": 0.1, "cold": 0.02, "rate": 0.1, "max_episode_steps": 300},
+    "": {"gamma": 0.9, "temperature_start": 0.03, "temperature_end": 0.01, "learning_rate": 0.3},
+    "rich": {
+        "gamma": 0.3,
+        "temperature_start": 0.1,
+        "temperature_end": 0.02,
+        "learning_rate": 0.1,
+        "max_episode_steps": 300,
+    },
 }
 """What was best for the paper's net; the other nets take the same, so that they can be compared with it."""
 
@@ -54,7 +60,7 @@ class Perceptron:
         self._options, self._linear = options, linear
         self._shapes = (inputs, options.hidden), (1, options.hidden), (options.hidden, 1), (1, 1)
         size = sum(rows * columns for rows, columns in self._shapes)
-        self._weights = torch.from_numpy(rng.uniform(-options.spread, options.spread, (nets, size)))
+        self._weights = torch.from_numpy(rng.uniform(-options.initial_range, options.initial_range, (nets, size)))
         self._changes = torch.zeros_like(self._weights)
         self._slopes = torch.zeros(size, dtype=torch.float64)
         self._first, self._bias, self._second, self._last = self._views(self._weights)
@@ -85,7 +91,7 @@ class Perceptron:
         torch.mul(hidden, delta, out=second[:, 0])
         last.fill_(delta)
         change = self._changes[net]
-        change.mul_(self._options.momentum).add_(self._slopes, alpha=self._options.rate)
+        change.mul_(self._options.momentum).add_(self._slopes, alpha=self._options.learning_rate)
         self._weights[net].add_(change)
 
     def save(self) -> dict[str, np.ndarray]:

@@ -4,19 +4,19 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 
-from phototaxis_agent.learner import POLICIES, load_point
+from phototaxis_agent.learner import POLICY_GROUP, load_point
 
 
 def is_policy(file: Path) -> bool:
     """Whether there is an entry point that is called as the file's suffix."""
-    return bool(entry_points(group=POLICIES, name=file.suffix.removeprefix(".")))
+    return bool(entry_points(group=POLICY_GROUP, name=file.suffix.removeprefix(".")))
 
 
 def load_policy(file: Path, trusted: bool, normalize: str = "") -> Any:
     """What makes agents of a policy file: called with a world and `max_episode_steps` it makes one,
-    and `crowd(arena)` drives many robots.
+    and `batch(arena)` drives many robots.
 
     `normalize` names the file with the statistics of the observations, if there is one.
 
@@ -25,7 +25,7 @@ def load_policy(file: Path, trusted: bool, normalize: str = "") -> Any:
     UserError
         when nothing reads such files, what it needs is not installed, or a file cannot be loaded.
     """
-    points = {point.name: point for point in entry_points(group=POLICIES)}
+    points = {point.name: point for point in entry_points(group=POLICY_GROUP)}
     point = points.get(file.suffix.removeprefix("."))
     if point is None:
         kinds = ", ".join(f".{name}" for name in points)

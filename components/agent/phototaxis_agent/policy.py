@@ -7,14 +7,14 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from phototaxis.checkpoint import Meta
-from phototaxis.errors import ComponentFailed, UserError
+from phototaxis.runtime.checkpoint import CheckpointMetadata
+from phototaxis.runtime.errors import ComponentFailed, UserError
 from phototaxis.task import ACTIONS, PERCEPTS, LightHistory, Observation, PerceptState, TaskOptions, state_number
 
 from phototaxis_agent.checked import CheckedLearner
 from phototaxis_agent.exploration import Exploration, draw
 from phototaxis_agent.generator import load_state, saved_state
-from phototaxis_agent.learner import Learner, Transition, find
+from phototaxis_agent.learner import Learner, Transition, find_learner
 
 
 class Policy:
@@ -50,7 +50,7 @@ class Policy:
         budget: int,
         learning: bool = True,
     ):
-        kind: type[Learner] = find(learner)
+        kind: type[Learner] = find_learner(learner)
         self.name, self.task, self.exploration = learner, task, exploration
         self.near, self.budget, self.learning = near, budget, learning
         self.percept = PERCEPTS[task.percept]
@@ -86,7 +86,7 @@ class Policy:
     def temperature(self) -> float:
         """T of equation 2 at the present epoch."""
         exploration = self.exploration
-        return exploration.temperature(self.epoch, self.budget) if self.learning else exploration.cold
+        return exploration.temperature(self.epoch, self.budget) if self.learning else exploration.temperature_end
 
     def table(self) -> list[float]:
         """Q of every state and action, flattened row by row, 9 a row; 0 where an action is not allowed."""
@@ -107,7 +107,7 @@ class Policy:
         return row
 
     def save(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-        """The fields of a checkpoint's `Meta` that tell of the policy, and the learner's arrays."""
+        """The fields of a checkpoint's `CheckpointMetadata` that tell of the policy, and the learner's arrays."""
         with self._aside():
             arrays = self.learner.save()
         fields = {
@@ -120,7 +120,7 @@ class Policy:
         }
         return fields, arrays
 
-    def take_over(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
+    def take_over(self, meta: CheckpointMetadata, arrays: dict[str, np.ndarray], source: str) -> None:
         """Take over what was learned, and nothing else.
 
         Raises
@@ -143,7 +143,7 @@ class Policy:
         except ComponentFailed as error:
             raise ComponentFailed(f"{source}: {error}") from error
 
-    def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
+    def restore(self, meta: CheckpointMetadata, arrays: dict[str, np.ndarray], source: str) -> None:
         """Continue from a checkpoint, bit for bit; the errors are those of `take_over`."""
         self.take_over(meta, arrays, source)
         try:

@@ -4,9 +4,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from phototaxis.machine import Record
-from phototaxis.messages import AgentLog
-from phototaxis.seated import SeatedAgent
+from phototaxis.runtime.machine import Record
+from phototaxis.runtime.seated import SeatedAgent
+from phototaxis.wire.messages import AgentLog
 
 TABLE_EVERY_S = 0.5
 

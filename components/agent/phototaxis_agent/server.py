@@ -3,19 +3,19 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from phototaxis.bus import Bus
-from phototaxis.chunks import Chunks
-from phototaxis.journal import Journal
-from phototaxis.messages import World
-from phototaxis.runner import Runner
-from phototaxis.seat_client import Mode
-from phototaxis.seated import SeatedAgent
-from phototaxis.store import Store
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.chunks import LogPublisher
+from phototaxis.runtime.journal import Journal
+from phototaxis.runtime.runner import Runner
+from phototaxis.runtime.seat_client import Mode
+from phototaxis.runtime.seated import SeatedAgent
+from phototaxis.runtime.store import Store
+from phototaxis.wire.messages import World
 
 from phototaxis_agent import kept
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.rows import AgentLogs
-from phototaxis_agent.stuck import watched
+from phototaxis_agent.watchdog import watchdog
 
 
 def serve(
@@ -47,5 +47,5 @@ def serve(
     journal = None if path is None else Journal(path.with_suffix(".journal"))
     found = kept.read(resume, required, journal)
     client = AgentClient(bus.ident, make, found, path is not None, mode, at)
-    with watched():
-        Runner(bus, client, Store(journal, path), Chunks(bus, "log/agent", AgentLogs(bus.ident))).run()
+    with watchdog():
+        Runner(bus, client, Store(journal, path), LogPublisher(bus, "log/agent", AgentLogs(bus.ident))).run()

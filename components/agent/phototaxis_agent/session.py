@@ -1,8 +1,8 @@
 """The agent in one run."""
 
-from phototaxis.messages import Readings, ReadingsOfMany, World
-from phototaxis.seated import SeatedAgent
-from phototaxis.topics import TOPICS, step_topics
+from phototaxis.runtime.seated import SeatedAgent
+from phototaxis.wire.messages import BatchReadings, Readings, World
+from phototaxis.wire.topics import TOPICS, step_topics
 
 from phototaxis_agent.answering import answering
 from phototaxis_agent.following import Following
@@ -23,6 +23,6 @@ class Session:
         """Answer from what the agent has been restored to."""
         self.answering = answering(self.world, self.agent)
 
-    def missed(self, readings: Readings | ReadingsOfMany) -> bool:
+    def missed(self, readings: Readings | BatchReadings) -> bool:
         """Whether the agent has not gone through every tick before this one."""
         return readings.tick > self.agent.tick[1] + 1

@@ -7,18 +7,18 @@ from typing import Any
 
 import msgspec
 from msgspec import Struct
-from phototaxis.checkpoint import Meta
-from phototaxis.errors import UserError
-from phototaxis.messages import World
-from phototaxis.options import convert, parse_groups, peek
+from phototaxis.runtime.checkpoint import CheckpointMetadata
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.options import convert, parse_groups, peek
+from phototaxis.runtime.phrases import known, plain
 from phototaxis.task import TaskOptions
-from phototaxis.words import known, plain
+from phototaxis.wire.messages import World
 
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.exploration import Exploration
-from phototaxis_agent.learner import find
+from phototaxis_agent.learner import find_learner
 from phototaxis_agent.policy import Policy
-from phototaxis_agent.stuck import watched
+from phototaxis_agent.watchdog import watchdog
 
 
 class LearnerOptions(Struct, kw_only=True):
@@ -28,7 +28,7 @@ class LearnerOptions(Struct, kw_only=True):
     """name of the learner"""
 
 
-class Setup(Struct):
+class AgentSetup(Struct):
     """Everything that defines an agent but the world and the seed."""
 
     learner: str
@@ -49,7 +49,7 @@ class Setup(Struct):
         policy = self._policy(
             near=world.arena.sensing.near,
             seed=world.seed if seed is None else seed,
-            budget=budget or world.epochs or DEFAULT_BUDGET,
+            budget=budget or world.epochs or DEFAULT_BUDGET_EPOCHS,
             learning=learning,
         )
         agent = Agent(policy)
@@ -61,17 +61,17 @@ class Setup(Struct):
         self._policy(near=1.0, seed=0, budget=1)
 
     def _policy(self, **given: Any) -> Policy:
-        with watched():
+        with watchdog():
             return Policy(self.learner, self.hyperparameters, self.task, self.exploration, **given)
 
 
 def presets(learner: str, percept: str) -> dict[str, Any]:
     """What a learner's author found best for a percept, where it differs from the options' defaults."""
-    kind = find(learner)
+    kind = find_learner(learner)
     return {**kind.presets.get("", {}), **kind.presets.get(percept, {})}
 
 
-def make_setup(learner: str = "qtable", **given: Any) -> Setup:
+def make_setup(learner: str = "qtable", **given: Any) -> AgentSetup:
     """A setup with the learner's presets and some options given by name, as on a command line.
 
     Raises
@@ -79,7 +79,7 @@ def make_setup(learner: str = "qtable", **given: Any) -> Setup:
     UserError
         for an unknown learner or option, or a value that does not fit.
     """
-    structs = find(learner).Options, TaskOptions, Exploration
+    structs = find_learner(learner).Options, TaskOptions, Exploration
     _refuse_doubles(learner, structs[1:])
     options = {field for struct in structs for field in struct.__struct_fields__}
     if unknown := sorted(given.keys() - options):
@@ -87,14 +87,14 @@ def make_setup(learner: str = "qtable", **given: Any) -> Setup:
     values = {**presets(learner, given.get("percept", TaskOptions().percept)), **given}
     own, task, exploration = structs
     parts = convert(own, values, str), convert(task, values, str), convert(exploration, values, str)
-    return Setup(learner, *parts)
+    return AgentSetup(learner, *parts)
 
 
 def _refuse_doubles(learner: str, structs: Iterable[type[Any]], others: Iterable[str] = ()) -> None:
     """Raise UserError for a hyperparameter that is called as a field of `structs` or as one of the options `others`."""
     taken = {"learner", "help", *(field for struct in structs for field in struct.__struct_fields__)}
     taken |= {option.removeprefix("--").replace("-", "_") for option in others}
-    for field in find(learner).Options.__struct_fields__:
+    for field in find_learner(learner).Options.__struct_fields__:
         if field in taken:
             raise UserError(
                 f"the learner '{learner}' calls a hyperparameter '{field}', which is an option of Phototaxis itself; "
@@ -102,11 +102,11 @@ def _refuse_doubles(learner: str, structs: Iterable[type[Any]], others: Iterable
             )
 
 
-DEFAULT_BUDGET = 3000
+DEFAULT_BUDGET_EPOCHS = 3000
 """Epochs that the temperature's decay is spread over in a run without an end."""
 
 
-def from_checkpoint(meta: Meta, source: str) -> Setup:
+def from_checkpoint(meta: CheckpointMetadata, source: str) -> AgentSetup:
     """The setup that a checkpoint was made with.
 
     Raises
@@ -115,9 +115,9 @@ def from_checkpoint(meta: Meta, source: str) -> Setup:
         when its values do not fit; `source` names it.
     """
     try:
-        return Setup(
+        return AgentSetup(
             meta.learner,
-            msgspec.convert(meta.hyperparameters, find(meta.learner).Options),
+            msgspec.convert(meta.hyperparameters, find_learner(meta.learner).Options),
             msgspec.convert({name: getattr(meta, name) for name in TaskOptions.__struct_fields__}, TaskOptions),
             msgspec.convert(meta.exploration, Exploration),
         )
@@ -152,13 +152,13 @@ def parse_setup(
         "learner": LearnerOptions,
         "task": TaskOptions,
         "exploration": Exploration,
-        f"hyperparameters of {name}": find(name).Options,
+        f"hyperparameters of {name}": find_learner(name).Options,
         **more,
     }
     defaults = presets(name, peek(words, "--percept", TaskOptions().percept))
     see = f"{prog} --learner {name}"
     parsed = parse_groups(groups, words, prog, about, defaults=defaults, more=others, see=see)
     own, chosen, task, exploration, hyperparameters, *rest = parsed
-    setup = Setup(chosen.learner, hyperparameters, task, exploration)
+    setup = AgentSetup(chosen.learner, hyperparameters, task, exploration)
     setup.check()
     return own, setup, *rest

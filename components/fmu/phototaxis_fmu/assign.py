@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 
 from phototaxis_fmu.description import Fmu
 from phototaxis_fmu.wiring import SUITES

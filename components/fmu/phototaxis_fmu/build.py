@@ -11,8 +11,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal
 
-from phototaxis.disk import try_file, write_whole
-from phototaxis.errors import UserError
+from phototaxis.runtime.disk import check_writable, write_atomic
+from phototaxis.runtime.errors import UserError
 
 from phototaxis_fmu.examples import FOLDER, Example, Variable
 
@@ -30,7 +30,7 @@ def build(example: Example, version: Version, file: Path, sources_only: bool = F
     UserError
         when the file cannot be written, or there is no C compiler.
     """
-    try_file(file, "--output")
+    check_writable(file, "--output")
     with TemporaryDirectory(prefix="phototaxis-fmu-") as folder:
         tree = Path(folder) / "fmu"
         sources = tree / "sources"
@@ -46,7 +46,7 @@ def build(example: Example, version: Version, file: Path, sources_only: bool = F
         archive = Path(shutil.make_archive(str(Path(folder) / "packed"), "zip", tree))
         if not sources_only:
             compile_sources(archive)
-        write_whole(file, archive.read_bytes())
+        write_atomic(file, archive.read_bytes())
 
 
 def compiled(file: Path) -> bytes:

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
-from phototaxis.errors import UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.options import parse
-from phototaxis.words import known
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.phrases import known
 
 
 class Info(Struct, kw_only=True):

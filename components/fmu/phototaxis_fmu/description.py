@@ -16,11 +16,11 @@ from fmpy.model_description import (
     read_model_description,
 )
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] - it has no stubs
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 
-LARGEST = 2_000_000_000
+MAX_UNPACKED_BYTES = 2_000_000_000
 """Bytes that an FMU may have when unpacked."""
-UNPACKING = (zipfile.BadZipFile, zlib.error, RuntimeError, OSError)
+UNPACKING_ERRORS = (zipfile.BadZipFile, zlib.error, RuntimeError, OSError)
 """What a damaged, an encrypted or an exotic archive, or a full disk, raises."""
 
 
@@ -78,7 +78,7 @@ def read(path: str, allow_invalid: bool = False) -> Fmu:
             _well_packed(path, archive)
             try:
                 version = _version(path, archive)
-            except UNPACKING as error:
+            except UNPACKING_ERRORS as error:
                 raise UserError(f"{path}: cannot be unpacked: {error}") from None
     except FileNotFoundError:
         raise UserError(f"{path}: there is no such file") from None
@@ -86,8 +86,10 @@ def read(path: str, allow_invalid: bool = False) -> Fmu:
         raise UserError(f"{path}: not an FMU: it is not a zip archive") from None
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
-    if size > LARGEST:
-        raise UserError(f"{path}: {size / 1e9:.1f} GB when unpacked; at most {LARGEST / 1e9:g} GB are allowed")
+    if size > MAX_UNPACKED_BYTES:
+        raise UserError(
+            f"{path}: {size / 1e9:.1f} GB when unpacked; at most {MAX_UNPACKED_BYTES / 1e9:g} GB are allowed"
+        )
     description = _describe(path, allow_invalid)
     interface = description.coSimulation
     if interface is None:

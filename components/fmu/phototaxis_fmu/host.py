@@ -15,16 +15,16 @@ from typing import NamedTuple
 
 import msgspec
 
-from phototaxis_fmu.description import UNPACKING, Fmu
-from phototaxis_fmu.instance import Setup, ends
+from phototaxis_fmu.description import UNPACKING_ERRORS, Fmu
+from phototaxis_fmu.instance import InstanceSetup, ends
 from phototaxis_fmu.log import Listener, Log
-from phototaxis_fmu.pace import Pace
+from phototaxis_fmu.pace import StepPlan
 from phototaxis_fmu.wiring import Wire, Wiring, size
 from phototaxis_fmu.worker import BEGIN, FAILED, HEAD, LENGTH, REPLACED, STEP
 
-LOADING = 30.0
+LOADING_S = 30.0
 """Seconds that an FMU may take to be loaded."""
-LOOK = 0.1
+LOOK_EVERY_S = 0.1
 """Seconds after which a silent worker is looked at: a helper of the FMU may hold its pipes when it is dead."""
 GUARD = 'read -r _; rm -rf -- "$2"; kill -s KILL -- "-$1"; rm -rf -- "$2"'
 """A shell that waits until its parent is gone, however it went: then it removes a folder and ends a
@@ -55,7 +55,7 @@ class Terms(NamedTuple):
 
     fmu: Fmu
     wiring: Wiring
-    pace: Pace
+    pace: StepPlan
     log: Log
     timeout: float = 5.0
     """Seconds after which a silent process is killed."""
@@ -122,7 +122,7 @@ class Host:
         self._poll.register(self._from, select.POLLIN)
         setup = msgspec.json.encode(self._setup(folder))
         self._write(LENGTH.pack(len(setup)) + setup)
-        self._read(HEAD.size, LOADING)
+        self._read(HEAD.size, LOADING_S)
 
     def begin(self, inputs: Sequence[float]) -> None:
         """Begin an episode with these inputs: reset all instances, or what serves in its place.
@@ -186,9 +186,9 @@ class Host:
         """Of the process; 0 when there is none."""
         return 0 if self._process is None else self._process.pid
 
-    def _setup(self, folder: str) -> Setup:
+    def _setup(self, folder: str) -> InstanceSetup:
         fmu, wiring, pace = self._terms.fmu, self._terms.wiring, self._terms.pace
-        return Setup(
+        return InstanceSetup(
             folder=folder, version=fmu.version, identifier=fmu.interface.modelIdentifier or "",
             token=fmu.description.guid or "", instances=self._instances,
             inputs=ends([_end(wire) for wire in wiring.inputs]), outputs=ends([_end(wire) for wire in wiring.outputs]),
@@ -201,7 +201,7 @@ class Host:
         try:
             with zipfile.ZipFile(self._terms.fmu.file if archive is None else BytesIO(archive)) as members:
                 members.extractall(folder)  # it strips what would lead out of the folder
-        except UNPACKING as error:
+        except UNPACKING_ERRORS as error:
             raise Failed(f"cannot be unpacked: {error}") from None
 
     def _begin(self, inputs: Sequence[float]) -> None:
@@ -223,10 +223,10 @@ class Host:
     def _read(self, size: int, timeout: float) -> bytes:
         answer, left = b"", timeout
         while True:
-            if not self._poll.poll(min(left, LOOK) * 1000):
+            if not self._poll.poll(min(left, LOOK_EVERY_S) * 1000):
                 if not self._alive():
                     raise self._died()
-                left -= LOOK
+                left -= LOOK_EVERY_S
                 if left <= 0:
                     raise Failed(self._end(f"gave no answer within {timeout:g} s and was ended"))
                 continue
@@ -252,7 +252,7 @@ class Host:
 
     def _died(self) -> Failed:
         try:
-            code = self._process.wait(LOOK) if self._process is not None else 0
+            code = self._process.wait(LOOK_EVERY_S) if self._process is not None else 0
         except subprocess.TimeoutExpired:
             return Failed(self._end("closed the pipes to its parent and was ended"))
         how = f"crashed with {signal.Signals(-code).name}" if code < 0 else f"ended its process with code {code}"

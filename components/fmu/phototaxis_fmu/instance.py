@@ -36,7 +36,7 @@ class Parameter(msgspec.Struct):
     """It may change the sizes of other variables: set in configuration mode."""
 
 
-class Setup(msgspec.Struct):
+class InstanceSetup(msgspec.Struct):
     """What the parent tells the worker first."""
 
     folder: str
@@ -110,7 +110,12 @@ class Instance:
     """
 
     def __init__(
-        self, setup: Setup, number: int, inputs: tuple[bytearray, int], outputs: tuple[bytearray, int], voice: Voice
+        self,
+        setup: InstanceSetup,
+        number: int,
+        inputs: tuple[bytearray, int],
+        outputs: tuple[bytearray, int],
+        voice: Voice,
     ):
         self._setup, self._voice, self._used, self._time = setup, voice, False, 0.0
         self._fmu = self._load(number)

@@ -6,13 +6,13 @@ import threading
 from contextlib import suppress
 from typing import IO
 
-SHOWN, SHOWN_ON_REQUEST = 20, 1000
+MAX_LINES, MAX_LINES_ON_REQUEST = 20, 1000
 """Most lines of an FMU that are shown: without and with its logging on."""
-LONGEST = 600
+MAX_LINE_CHARACTERS = 600
 """Most characters of a line; a longer one loses its middle."""
-RAW = 8 * LONGEST
+MAX_LINE_BYTES = 8 * MAX_LINE_CHARACTERS
 """Most bytes of a line that are looked at."""
-CHUNK = 65536
+READ_BYTES = 65536
 """Bytes that are read at once."""
 MARK = b"\x1e"
 """Begins a line of the FMU's logger, before its status; other lines were printed."""
@@ -21,11 +21,15 @@ STATUS = ("info", "warning", "discard", "error", "fatal error", "pending")
 
 def one_line(said: bytes) -> str:
     """Whatever an FMU says, as one printable line of bounded length."""
-    if len(said) > RAW:
-        said = said[: RAW // 2] + said[-RAW // 2 :]
+    if len(said) > MAX_LINE_BYTES:
+        said = said[: MAX_LINE_BYTES // 2] + said[-MAX_LINE_BYTES // 2 :]
     words = " ".join(said.decode(errors="replace").split())
     text = "".join(one if one.isprintable() else "�" for one in words)
-    return text if len(text) <= LONGEST else f"{text[: LONGEST // 3]} … {text[-2 * LONGEST // 3 :]}"
+    return (
+        text
+        if len(text) <= MAX_LINE_CHARACTERS
+        else f"{text[: MAX_LINE_CHARACTERS // 3]} … {text[-2 * MAX_LINE_CHARACTERS // 3 :]}"
+    )
 
 
 class Log:
@@ -38,7 +42,7 @@ class Log:
     most : number of lines.
     """
 
-    def __init__(self, label: str, everything: bool = False, most: int = SHOWN):
+    def __init__(self, label: str, everything: bool = False, most: int = MAX_LINES):
         self.label, self.everything = label, everything
         self._most, self._shown, self._last = most, 0, ""
         self._lock = threading.Lock()  # an FMU may have several processes
@@ -60,7 +64,7 @@ class Log:
             if self.full or said == self._last:
                 return
             self._shown += 1
-            more = "" if self._most >= SHOWN_ON_REQUEST else " (--fmu-log shows more)"
+            more = "" if self._most >= MAX_LINES_ON_REQUEST else " (--fmu-log shows more)"
             self.tell(f"says more, which is not shown{more}" if self.full else said)
 
 
@@ -84,12 +88,12 @@ class Listener:
     def _listen(self) -> None:
         with self._stream:
             line = b""
-            while part := os.read(self._stream.fileno(), CHUNK):
+            while part := os.read(self._stream.fileno(), READ_BYTES):
                 *lines, line = (line + part).split(b"\n")
                 for one in lines[-1:] if self._log.full else lines:
                     self._hear(one)
-                if len(line) > 2 * CHUNK:
-                    line = line[:CHUNK] + line[-CHUNK:]
+                if len(line) > 2 * READ_BYTES:
+                    line = line[:READ_BYTES] + line[-READ_BYTES:]
             self._hear(line)
 
     def _hear(self, line: bytes) -> None:

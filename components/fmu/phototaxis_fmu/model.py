@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from itertools import cycle
 from typing import NamedTuple
 
-from phototaxis.errors import ComponentFailed
+from phototaxis.runtime.errors import ComponentFailed
 from phototaxis_sensors.model import BuiltIn, Moment, SensorModel
 
 from phototaxis_fmu.host import Failed, Host, Team
@@ -16,12 +16,12 @@ from phototaxis_fmu.rigs import Rig
 from phototaxis_fmu.start import bounds
 from phototaxis_fmu.wiring import Wire, Wiring, size
 
-RESTARTS, WITHIN = 3, 60.0
+MAX_RESTARTS, RESTART_WINDOW_S = 3, 60.0
 """An FMU that fails more than so many times within so many seconds keeps failing."""
 ROUNDING = 1e-6
 """What an output may be beyond its limits, relative to them: enough for sums in single precision."""
-LARGEST = sys.float_info.max
-REMEMBERED = 100_000
+MAX_FLOAT = sys.float_info.max
+MAX_REMEMBERED_TICKS = 100_000
 """Ticks of an episode that are kept to bring a restarted FMU to the present."""
 
 
@@ -53,8 +53,8 @@ class Stepped:
         self.label, self._host, self._fallback, self.failed = label, host, fallback, False
         self._in_time = in_time
         self._episode, self._tick = -1, -1
-        self._steps: deque[Step] = deque(maxlen=REMEMBERED)
-        self._failures: deque[float] = deque(maxlen=RESTARTS + 1)
+        self._steps: deque[Step] = deque(maxlen=MAX_REMEMBERED_TICKS)
+        self._failures: deque[float] = deque(maxlen=MAX_RESTARTS + 1)
         outputs = self._outputs = [wire for wire in wiring.outputs for _ in range(size(wire))]
         self._limits = [_limits(wire) for wire in outputs]
         self._plain = all((wire.factor, wire.offset) == (1, 0) for wire in outputs)
@@ -101,16 +101,16 @@ class Stepped:
         while True:
             self._failures.append(time.monotonic())
             line = f"{self.label}: {why} at tick {self._tick}"
-            if len(self._failures) > RESTARTS and self._failures[-1] - self._failures[0] < WITHIN:
+            if len(self._failures) > MAX_RESTARTS and self._failures[-1] - self._failures[0] < RESTART_WINDOW_S:
                 self._host.stop()
-                line = f"{line}, after {RESTARTS} restarts"
+                line = f"{line}, after {MAX_RESTARTS} restarts"
                 if not self._fallback:
                     raise ComponentFailed(line)
                 print(f"sensors: {line}; the built-in model takes its place", file=sys.stderr, flush=True)
                 self.failed = True
                 return None
             print(f"sensors: {line}; restarted", file=sys.stderr, flush=True)
-            if len(self._steps) == REMEMBERED:
+            if len(self._steps) == MAX_REMEMBERED_TICKS:
                 self.anew = self._tick
             try:
                 self._host.start(logging=True)
@@ -142,20 +142,20 @@ class Stepped:
 def _limits(wire: Wire) -> tuple[float, float]:
     """What an output may be, in its own unit: as declared, and finite."""
     low, high = bounds(wire.variable)
-    return max(low, -LARGEST), min(high, LARGEST)
+    return max(low, -MAX_FLOAT), min(high, MAX_FLOAT)
 
 
 def _rounding(limit: float, wire: Wire) -> float:
     """How far beyond a limit is rounding: relative to the limit, or to one of our units where it is 0."""
-    return ROUNDING * max(abs(limit), abs(wire.factor)) if abs(limit) < LARGEST else 0.0
+    return ROUNDING * max(abs(limit), abs(wire.factor)) if abs(limit) < MAX_FLOAT else 0.0
 
 
 def _words(low: float, high: float) -> str:
-    if (low, high) == (-LARGEST, LARGEST):
+    if (low, high) == (-MAX_FLOAT, MAX_FLOAT):
         return "not a finite number"
-    if high == LARGEST:
+    if high == MAX_FLOAT:
         return f"below {low:g}"
-    return f"above {high:g}" if low == -LARGEST else f"not in {low:g} to {high:g}"
+    return f"above {high:g}" if low == -MAX_FLOAT else f"not in {low:g} to {high:g}"
 
 
 class FmuModel:
@@ -171,7 +171,7 @@ class FmuModel:
     def __init__(self, stepped: Stepped, rig: Rig, builtin: SensorModel, name: str):
         self._stepped, self._rig, self._builtin, self._name = stepped, rig, builtin, name
 
-    remembers = True
+    stateful = True
 
     @property
     def name(self) -> str:

@@ -4,13 +4,13 @@ import math
 from typing import NamedTuple
 
 from fmpy.model_description import ModelDescription
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 
-MOST = 1000
+MAX_STEPS = 1000
 """Most steps in a control period that an FMU's description may ask for."""
 
 
-class Pace(NamedTuple):
+class StepPlan(NamedTuple):
     """A control period as an FMU goes through it."""
 
     step: float
@@ -21,7 +21,7 @@ class Pace(NamedTuple):
     """What the FMU would rather have; "" where it gets it."""
 
 
-def pace(description: ModelDescription, period: float, asked: float) -> Pace:
+def plan_steps(description: ModelDescription, period: float, asked: float) -> StepPlan:
     """The steps for a control period, as asked (s; 0: as the FMU's description wants it).
 
     Raises
@@ -33,22 +33,22 @@ def pace(description: ModelDescription, period: float, asked: float) -> Pace:
         times = _fits(asked, period)
         if not times:
             raise UserError(f"--fmu-step {asked:g}: the control period, {period:g} s, is no whole number of such steps")
-        return Pace(asked, times)
+        return StepPlan(asked, times)
     interface, experiment = description.coSimulation, description.defaultExperiment
     fixed = float(interface.fixedInternalStepSize or 0) if interface is not None else 0.0
     suggested = float(experiment.stepSize or 0) if experiment is not None else 0.0
     variable = interface is not None and interface.canHandleVariableCommunicationStepSize
     own = fixed or (0.0 if variable else suggested)
-    if own and 0 < (times := _fits(own, period)) <= MOST:
-        return Pace(own, times)
+    if own and 0 < (times := _fits(own, period)) <= MAX_STEPS:
+        return StepPlan(own, times)
     wish = own or suggested
     fitting = _fits(wish, period) if wish else 1
     if fitting == 1:
-        return Pace(period, 1)
+        return StepPlan(period, 1)
     words = "has" if own else "suggests"
     remark = f"{words} steps of {wish:g} s; it gets steps of {period:g} s, the control period"
-    hint = f" (--fmu-step {wish} gives it its own)" if 0 < fitting <= MOST else ""
-    return Pace(period, 1, remark + hint)
+    hint = f" (--fmu-step {wish} gives it its own)" if 0 < fitting <= MAX_STEPS else ""
+    return StepPlan(period, 1, remark + hint)
 
 
 def _fits(step: float, period: float) -> int:

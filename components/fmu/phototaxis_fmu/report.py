@@ -5,9 +5,9 @@ import random
 import time
 from typing import Any
 
-from phototaxis.arena import Arena, Light
-from phototaxis.errors import UserError
-from phototaxis_sensors.model import Past, SensorModel
+from phototaxis.geometry.arena import Arena, Light
+from phototaxis.runtime.errors import UserError
+from phototaxis_sensors.model import PastMoment, SensorModel
 from phototaxis_sensors.scene import Scene
 
 from phototaxis_fmu.description import Fmu
@@ -15,7 +15,7 @@ from phototaxis_fmu.sensors import FmuSensors
 from phototaxis_fmu.start import bounds
 from phototaxis_fmu.wiring import SUITES, Suite, connect, declared_unit
 
-EPISODE, EPISODES = 50, 4
+EPISODE_TICKS, EPISODE_COUNT = 50, 4
 """Ticks and episodes of a dry run; each episode is gone through twice."""
 
 
@@ -110,21 +110,21 @@ def dry_run(sensors: FmuSensors, kind: str) -> dict[str, Any]:
     arena = Arena("check", (10.0, 10.0), [Light((5.0, 5.0))])
     model: SensorModel = getattr(sensors(arena, Scene(arena)), kind)
     chance, readings, spent = random.Random(1), list[float](), 0.0  # noqa: S311 - a drive, no secret
-    for episode in range(EPISODES):
-        ways = [(chance.uniform(1, 9), chance.uniform(1, 9), chance.uniform(-3, 3)) for _ in range(EPISODE)]
+    for episode in range(EPISODE_COUNT):
+        ways = [(chance.uniform(1, 9), chance.uniform(1, 9), chance.uniform(-3, 3)) for _ in range(EPISODE_TICKS)]
         twice = []
         for half in range(2):
             began = time.perf_counter()
             at = 2 * episode + half
-            twice.append([list(model(Past(at * EPISODE + i, at, *way))) for i, way in enumerate(ways)])
+            twice.append([list(model(PastMoment(at * EPISODE_TICKS + i, at, *way))) for i, way in enumerate(ways)])
             spent += time.perf_counter() - began
         if twice[0] != twice[1]:
             line = f"after {sensors.begins} the same inputs give other readings: runs with this FMU cannot be repeated"
             raise UserError(line + (" (unless --fmu-fresh mends it)" if sensors.begins == "a reset" else ""))
         readings += [value for one in twice[0] for value in one]
-    ticks = 2 * EPISODE * EPISODES
+    ticks = 2 * EPISODE_TICKS * EPISODE_COUNT
     low, high = min(readings), max(readings)
     return {
-        "kind": kind, "ticks": ticks, "episodes": 2 * EPISODES, "low": low, "high": high,
+        "kind": kind, "ticks": ticks, "episodes": 2 * EPISODE_COUNT, "low": low, "high": high,
         "microseconds": spent / ticks * 1e6, "begins": sensors.begins,
     }  # fmt: skip

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 from phototaxis_sensors.light import Sights
 from phototaxis_sensors.model import Moment, SensorModel
 

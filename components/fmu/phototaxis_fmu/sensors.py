@@ -3,27 +3,27 @@
 import math
 from typing import NamedTuple
 
-from phototaxis.arena import Arena
-from phototaxis.errors import UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import World
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.wire.messages import World
 from phototaxis_sensors.light import Sights
 from phototaxis_sensors.model import SensorModel
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.suite import Models, built_in
 
 from phototaxis_fmu.assign import assign
+from phototaxis_fmu.batch import FmuBatch, InstanceBatch
 from phototaxis_fmu.build import compiled
-from phototaxis_fmu.crowd import Crew, FmuCrowd
 from phototaxis_fmu.description import Fmu, read, require_library
 from phototaxis_fmu.host import Failed, Host, Team, Terms, stay_on_one_cpu
-from phototaxis_fmu.log import SHOWN, SHOWN_ON_REQUEST, Log
+from phototaxis_fmu.log import MAX_LINES, MAX_LINES_ON_REQUEST, Log
 from phototaxis_fmu.model import FmuModel, Stepped
-from phototaxis_fmu.pace import pace
+from phototaxis_fmu.pace import plan_steps
 from phototaxis_fmu.rigs import Beams, Filters, Lamps, Rig
 from phototaxis_fmu.wiring import SUITES, Wiring, connect
 
-PROCESSES = 64
+MAX_PROCESSES = 64
 """Most processes for an FMU of which a process can have only one instance."""
 
 
@@ -50,7 +50,7 @@ class FmuSensors:
         when an FMU cannot be used, or an option does not fit it.
     """
 
-    remembers = True
+    stateful = True
 
     def __init__(self, options: FmuOptions, one_cpu: bool = False, logging: bool = False):
         self._options, self._one_cpu = options, one_cpu
@@ -61,7 +61,7 @@ class FmuSensors:
         for kind, fmu in fmus.items():
             wiring = connect(fmu, SUITES[kind], names[kind], parameters[kind])
             require_library(fmu, options.allow_compile)
-            most = SHOWN_ON_REQUEST if options.fmu_log else SHOWN
+            most = MAX_LINES_ON_REQUEST if options.fmu_log else MAX_LINES
             log = Log(f"{kind} FMU {fmu.name}", options.fmu_log or logging, most)
             self._wired[kind] = Wired(kind, fmu, wiring, None if fmu.compiled else compiled(fmu.file), log)
         self._running: list[Host | Team] = []
@@ -92,16 +92,16 @@ class FmuSensors:
                 light = self._model(wired, arena, Lamps(wired.wiring, arena, Sights(arena, scene)), light)
         return Models(sonar, light)
 
-    def crowd(self, world: World, count: int) -> FmuCrowd:
+    def batch(self, world: World, count: int) -> FmuBatch:
         """The sensors of `count` robots in a world; models made before are ended."""
         self.close()
-        arena, crews = world.arena, dict[str, Crew]()
+        arena, crews = world.arena, dict[str, InstanceBatch]()
         for kind, wired in self._wired.items():
             sensors = len(arena.robot.sonars) // wired.wiring.width if kind == "sonar" else 2
             each = sensors * (len(arena.lights) if kind == "light" and wired.wiring.ports != ["raw"] else 1)
             host = self._host(wired, count * each, arena.motion.control_period)
-            crews[kind] = Crew(self._stepped(host, wired), wired.wiring)
-        return FmuCrowd(world, crews.get("sonar"), crews.get("light"))
+            crews[kind] = InstanceBatch(self._stepped(host, wired), wired.wiring)
+        return FmuBatch(world, crews.get("sonar"), crews.get("light"))
 
     def close(self) -> None:
         """End the FMUs' processes."""
@@ -111,12 +111,12 @@ class FmuSensors:
     def _host(self, wired: Wired, instances: int, period: float, quiet: bool = False) -> Host | Team:
         """Processes that have loaded the FMU; `quiet`: without a remark on its steps."""
         options = self._options
-        if wired.fmu.once and instances > PROCESSES:
+        if wired.fmu.once and instances > MAX_PROCESSES:
             raise UserError(
                 f"{wired.fmu.file}: a process can have it once, and {instances} instances are needed; "
-                f"at most {PROCESSES} processes are started (with evaluate: fewer --placements)"
+                f"at most {MAX_PROCESSES} processes are started (with evaluate: fewer --placements)"
             )
-        found = pace(wired.fmu.description, period, options.fmu_step)
+        found = plan_steps(wired.fmu.description, period, options.fmu_step)
         if found.remark and not quiet:
             wired.log.tell(found.remark)
         terms = Terms(wired.fmu, wired.wiring, found, wired.log, options.fmu_timeout, options.fmu_fresh, wired.archive)

@@ -5,7 +5,7 @@ import re
 from typing import Any
 
 from fmpy.model_description import ModelVariable
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 
 from phototaxis_fmu.description import Fmu
 from phototaxis_fmu.instance import Parameter

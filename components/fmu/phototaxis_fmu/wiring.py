@@ -6,7 +6,7 @@ from collections.abc import Container, Mapping
 from typing import NamedTuple
 
 from fmpy.model_description import ModelVariable, Unit
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 
 from phototaxis_fmu.description import Fmu
 from phototaxis_fmu.instance import Parameter

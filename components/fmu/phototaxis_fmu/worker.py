@@ -1,9 +1,9 @@
 """The process that foreign code runs in: it loads one FMU and steps its instances for its parent.
 
 Requests come on standard input, answers go to what was standard output; what the FMU prints and logs goes to
-standard error. The first request is a `Setup` in JSON, after its length; each later one a head (`HEAD`: what to do, how
-many periods) and the inputs of all instances, as doubles. An answer is a head (`DONE` and 0) and the outputs; or
-`FAILED`, the length of a text, and the text; `REPLACED` with its text comes before an answer.
+standard error. The first request is a `InstanceSetup` in JSON, after its length; each later one a head (`HEAD`: what to
+do, how many periods) and the inputs of all instances, as doubles. An answer is a head (`DONE` and 0) and the outputs;
+or `FAILED`, the length of a text, and the text; `REPLACED` with its text comes before an answer.
 """
 
 import fcntl
@@ -14,12 +14,12 @@ from contextlib import suppress
 
 import msgspec
 
-from phototaxis_fmu.instance import Instance, Setup, Voice, explain
+from phototaxis_fmu.instance import Instance, InstanceSetup, Voice, explain
 
 HEAD = struct.Struct("<qq")
 LENGTH = struct.Struct("<q")
 BEGIN, STEP = 1, 2
-APART = 200
+MIN_PIPE_NUMBER = 200
 """Number from which on our pipes are: some FMUs close the first ones, which they think are their own."""
 DONE, FAILED, REPLACED = 0, 1, 2
 
@@ -27,7 +27,7 @@ DONE, FAILED, REPLACED = 0, 1, 2
 class Worker:
     """All instances, and the buffers that they share."""
 
-    def __init__(self, setup: Setup, voice: Voice):
+    def __init__(self, setup: InstanceSetup, voice: Voice):
         size_in, size_out = (8 * sum(end.values for end in ends) for ends in (setup.inputs, setup.outputs))
         self.inputs = bytearray(HEAD.size + size_in * setup.instances)
         self.outputs = bytearray(HEAD.size + size_out * setup.instances)
@@ -70,7 +70,7 @@ def serve(source: int, answers: int) -> None:
         return
     text = bytearray(LENGTH.unpack(length)[0])
     read(source, memoryview(text))
-    setup = msgspec.json.decode(text, type=Setup)
+    setup = msgspec.json.decode(text, type=InstanceSetup)
     voice = Voice(setup.least)
     try:
         worker = Worker(setup, voice)
@@ -92,7 +92,7 @@ def _say(answers: int, kind: int, words: str) -> None:
 
 
 def main() -> None:
-    source, answers = (fcntl.fcntl(pipe, fcntl.F_DUPFD_CLOEXEC, APART) for pipe in (0, 1))
+    source, answers = (fcntl.fcntl(pipe, fcntl.F_DUPFD_CLOEXEC, MIN_PIPE_NUMBER) for pipe in (0, 1))
     os.dup2(2, 1)  # what the FMU prints must not be taken for an answer
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     serve(source, answers)

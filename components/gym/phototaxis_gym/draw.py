@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 from PIL import Image, ImageDraw
 
-SIDE = 480
+SIDE_PIXELS = 480
 """Pixels of the longer side."""
 PAPER, INK, STONE, YELLOW, BLUE, RAY = "#f6f6f3", "#3c3c3c", "#787878", "#f0b400", "#145aaa", "#b4c8dc"
 
@@ -21,7 +21,7 @@ def frame_rate(arena: Arena) -> float:
 class Canvas:
     """Draws robot and rays into a picture of what does not move, `side` pixels long."""
 
-    def __init__(self, arena: Arena, side: int = SIDE):
+    def __init__(self, arena: Arena, side: int = SIDE_PIXELS):
         self._arena, self._scale = arena, side / max(arena.size)
         self._mounts = [(sonar.position, sonar.angle) for sonar in arena.robot.sonars]
         width, height = (round(self._scale * side) for side in arena.size)

@@ -7,17 +7,17 @@ from contextlib import ExitStack
 from typing import Any
 
 from gymnasium.error import ClosedEnvironmentError, Error, ResetNeeded
-from phototaxis.bus import Bus
-from phototaxis.component import made_up
-from phototaxis.errors import UserError
-from phototaxis.machine import Ask, Effect, Event
-from phototaxis.messages import Command, CommandOfMany, Control, ControlReply, World
-from phototaxis.options import convert
-from phototaxis.seat_client import Place, SeatClient
-from phototaxis.session import BusOptions, open_session, place
-from phototaxis.topics import step_topics
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.component import unique_name
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.machine import Ask, Effect, Event
+from phototaxis.runtime.options import convert
+from phototaxis.runtime.seat_client import Place, SeatClient
+from phototaxis.runtime.session import BusOptions, bus_location, open_session
+from phototaxis.wire.messages import BatchCommand, Command, Control, ControlReply, World
+from phototaxis.wire.topics import step_topics
 
-FILES = (".json5", ".json", ".yaml", ".yml")
+CONFIG_SUFFIXES = (".json5", ".json", ".yaml", ".yml")
 """How the names of Zenoh's configuration files end."""
 
 
@@ -44,12 +44,12 @@ class Link:
             options = convert(BusOptions, {"name": world})
         except UserError:
             raise Error(f"world '{world}': up to 40 letters, digits, '_', '.' and '-'") from None
-        if connect.endswith(FILES):
+        if connect.endswith(CONFIG_SUFFIXES):
             options.zenoh_config = connect
         elif connect != "local":
             options.connect = [connect]
-        self._where = f"the world '{world}' {place(options)}"
-        ident = made_up("gymnasium")
+        self._where = f"the world '{world}' {bus_location(options)}"
+        ident = unique_name("gymnasium")
         self._seat = SeatClient(ident)
         with ExitStack() as stack:
             try:
@@ -89,7 +89,7 @@ class Link:
         self._now = self._hear(lambda readings: readings.run == reply.status.run)
         return self._now
 
-    def answer(self, make: Callable[[str, int], Command | CommandOfMany]) -> Any:
+    def answer(self, make: Callable[[str, int], Command | BatchCommand]) -> Any:
         """Answer the newest tick with what `make` makes of its run and number; the first readings that show it obeyed.
 
         In lockstep those are the next tick's. In real time the world does not wait: what came while nobody was

@@ -5,24 +5,24 @@ from typing import Any, Self
 
 import numpy as np
 from gymnasium import spaces
-from phototaxis.arena import Arena
-from phototaxis.checkpoint import Meta
-from phototaxis.errors import UserError
-from phototaxis.messages import Readings, World
-from phototaxis.options import convert
-from phototaxis.seated import SeatedAgent, Step
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.checkpoint import CheckpointMetadata
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.options import convert
+from phototaxis.runtime.seated import SeatedAgent, Step
 from phototaxis.task import ACTIONS, MOTORS, Episode, TaskOptions, action_of
+from phototaxis.wire.messages import Readings, World
 
 from phototaxis_gym.policy_file import Normalize, load, normalizer, was_normalized
 from phototaxis_gym.spaces import observer, rewards
 
-PERCEPTS = ("simple", "rich", "continuous", "sensors")
+OBSERVATIONS = ("simple", "rich", "continuous", "sensors")
 
 Hidden = tuple[np.ndarray, ...] | None
 """What a recurrent policy remembers of the episodes of the robots that it drives together; None for nothing yet."""
 
 
-class Policy:
+class FrozenPolicy:
     """A frozen policy for N robots: from what they sense to their motor commands, as it was trained.
 
     Which percept and which actions it has follows from the model's spaces. It may drive any number of robots: what a
@@ -36,7 +36,7 @@ class Policy:
 
     def __init__(self, model: Any, file: Path, arena: Arena, normalize: Normalize | None = None):
         space = model.observation_space
-        self.percept = next((name for name in PERCEPTS if observer(name, arena).space == space), "")
+        self.percept = next((name for name in OBSERVATIONS if observer(name, arena).space == space), "")
         self._discrete = model.action_space == spaces.Discrete(len(ACTIONS))
         if not self.percept or not (self._discrete or model.action_space == spaces.Box(-1.0, 1.0, (2,), np.float32)):
             theirs = f"observes {short(space)} and acts in {model.action_space}"
@@ -78,7 +78,7 @@ def short(space: Any) -> str:
 def wrapped(space: Any, arena: Arena) -> str:
     """Which wrapper may have made these observations from ours; empty when none is known."""
     shape = getattr(space, "shape", None) or ()
-    for name in PERCEPTS:
+    for name in OBSERVATIONS:
         ours = observer(name, arena).space
         if not isinstance(ours, spaces.Box) or not isinstance(space, spaces.Box) or not shape:
             continue
@@ -95,7 +95,7 @@ def wrapped(space: Any, arena: Arena) -> str:
 class PolicyAgent(SeatedAgent):
     """Turns readings into the commands of a frozen policy."""
 
-    def __init__(self, policy: Policy, max_episode_steps: int):
+    def __init__(self, policy: FrozenPolicy, max_episode_steps: int):
         percept = "continuous" if policy.percept == "sensors" else policy.percept
         task = convert(TaskOptions, {"percept": percept, "max_episode_steps": max_episode_steps})
         super().__init__(f"policy-{policy.file.stem}", task)
@@ -114,7 +114,7 @@ class PolicyAgent(SeatedAgent):
     def another(self) -> Self:
         return type(self)(self.policy, self.task.max_episode_steps)
 
-    def checkpoint(self) -> tuple[Meta, dict[str, np.ndarray]]:
+    def checkpoint(self) -> tuple[CheckpointMetadata, dict[str, np.ndarray]]:
         """Where it is in its episode, for a successor with the same policy; the policy itself is in its file."""
         arrays = {f"hidden_{at}": part for at, part in enumerate(self.hidden or ())}
         meta = self._meta(
@@ -122,16 +122,16 @@ class PolicyAgent(SeatedAgent):
         )
         return meta, arrays
 
-    def restore(self, meta: Meta, arrays: dict[str, np.ndarray], source: str) -> None:
+    def restore(self, meta: CheckpointMetadata, arrays: dict[str, np.ndarray], source: str) -> None:
         """Continue where another one with the same policy is; UserError when its memory does not fit."""
         self.hidden = self.policy.stored(arrays, source)
         super().restore(meta, arrays, source)
 
 
-class PolicyCrowd:
+class BatchPolicyAgent:
     """Drives N robots through an evaluation."""
 
-    def __init__(self, policy: Policy):
+    def __init__(self, policy: FrozenPolicy):
         self._policy = policy
         self._hidden: Hidden = None
 
@@ -164,9 +164,9 @@ class PolicyFile:
         agent.enter(world.arena)
         return agent
 
-    def crowd(self, arena: Arena) -> PolicyCrowd:
+    def batch(self, arena: Arena) -> BatchPolicyAgent:
         """What drives many robots in an evaluation."""
-        return PolicyCrowd(self._policy(arena))
+        return BatchPolicyAgent(self._policy(arena))
 
-    def _policy(self, arena: Arena) -> Policy:
-        return Policy(self._model, self._file, arena, self._normalize)
+    def _policy(self, arena: Arena) -> FrozenPolicy:
+        return FrozenPolicy(self._model, self._file, arena, self._normalize)

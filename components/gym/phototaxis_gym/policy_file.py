@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 
 Normalize = Callable[[np.ndarray], np.ndarray]
 """What VecNormalize makes of observations."""

@@ -1,13 +1,13 @@
 """One robot behind the bus, as an environment drives it."""
 
 from gymnasium.error import Error
-from phototaxis.messages import Command, End, Readings
+from phototaxis.wire.messages import Command, End, Readings
 from phototaxis_sim.physics import Pose
 
 from phototaxis_gym.link import Link, refuse_poses
 
 
-class There:
+class RemoteBackend:
     """One robot behind the bus."""
 
     pose = None

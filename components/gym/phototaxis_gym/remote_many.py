@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from gymnasium.error import Error
-from phototaxis.codec import Refused
-from phototaxis.columns import FLAG, pack, unpack
-from phototaxis.messages import CommandOfMany, ReadingsOfMany
 from phototaxis.task import BatchObservation
+from phototaxis.wire.codec import Refused
+from phototaxis.wire.columns import FLAG, pack, unpack
+from phototaxis.wire.messages import BatchCommand, BatchReadings
 from phototaxis_sim.physics import Pose
 
 from phototaxis_gym.link import Link, refuse_poses
@@ -15,7 +15,7 @@ from phototaxis_gym.link import Link, refuse_poses
 FOLLOW = "behind the bus the robots' seeds are S, S + 1, S + 2, …"
 
 
-class ManyThere:
+class RemoteBatchBackend:
     """N robots behind the bus."""
 
     poses = None
@@ -44,7 +44,7 @@ class ManyThere:
         ident = self._link.ident
         return self._senses(
             self._link.answer(
-                lambda run, tick: CommandOfMany(run=run, tick=tick, author=ident, left=left, right=right, end=end)
+                lambda run, tick: BatchCommand(run=run, tick=tick, author=ident, left=left, right=right, end=end)
             )
         )
 
@@ -59,7 +59,7 @@ class ManyThere:
         """Leave the seat and the bus."""
         self._link.close()
 
-    def _senses(self, readings: ReadingsOfMany) -> BatchObservation:
+    def _senses(self, readings: BatchReadings) -> BatchObservation:
         try:
             sonar, light = unpack(readings.sonar, self._count, 16), unpack(readings.light, self._count, 2)
             front, rear = unpack(readings.contact, self._count, 2, FLAG).astype(bool)

@@ -7,27 +7,27 @@ from typing import Any
 
 import numpy as np
 from gymnasium.utils import seeding
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 from phototaxis_sim.physics import Physics, Pose
 
 from phototaxis_gym.errors import WrongSeeds
 
-LARGEST = 2**53
+MAX_SEED = 2**53
 """The largest seed of a run: JSON carries it exactly."""
-LOW_BITS = 20
+LOW_SEED_BITS = 20
 
 
 def run_seed(seed: int) -> int:
     """The seed of the run that stands for a seed of Gymnasium's, which may be any number.
 
-    Up to `LARGEST` it is the number itself. Of a larger one the upper bits are hashed and the lower 20 kept, so that
+    Up to `MAX_SEED` it is the number itself. Of a larger one the upper bits are hashed and the lower 20 kept, so that
     seeds which follow one another stay so.
     """
-    if seed <= LARGEST:
+    if seed <= MAX_SEED:
         return int(seed)
-    high, low = divmod(seed, 2**LOW_BITS)
+    high, low = divmod(seed, 2**LOW_SEED_BITS)
     digest = hashlib.blake2b(high.to_bytes((high.bit_length() + 7) // 8), digest_size=4).digest()
-    return int.from_bytes(digest) << LOW_BITS | low
+    return int.from_bytes(digest) << LOW_SEED_BITS | low
 
 
 def row_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:

@@ -6,16 +6,16 @@ import gymnasium
 import numpy as np
 from gymnasium import logger
 from gymnasium.error import Error, ResetNeeded
-from phototaxis.errors import UserError
-from phototaxis.messages import ENDS, End
+from phototaxis.runtime.errors import UserError
 from phototaxis.task import Episode
+from phototaxis.wire.messages import ENDS, End
 from phototaxis_sim import arenas
 
 from phototaxis_gym import MAX_EPISODE_STEPS
+from phototaxis_gym.backend import Backend, LocalBackend
 from phototaxis_gym.draw import Canvas, Window, frame_rate
-from phototaxis_gym.place import Here, Place
-from phototaxis_gym.remote import There
-from phototaxis_gym.resets import LARGEST, given_poses, run_seed
+from phototaxis_gym.remote import RemoteBackend
+from phototaxis_gym.resets import MAX_SEED, given_poses, run_seed
 from phototaxis_gym.spaces import actions, motors, observer, rewards, valid_percept
 
 
@@ -66,12 +66,14 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         self._reward, self.action_space = rewards(reward, valid_percept(percept)), actions(action)
         self.render_mode = render_mode
         try:
-            self._place: Place = (
-                There(connect, world, timeout) if connect else Here(arenas.enter(arena or "paper", goal=False))
+            self._backend: Backend = (
+                RemoteBackend(connect, world, timeout)
+                if connect
+                else LocalBackend(arenas.load_checked(arena or "paper", goal=False))
             )
         except UserError as error:
             raise Error(str(error)) from None
-        self._arena = self._place.arena
+        self._arena = self._backend.arena
         self.metadata = {**self.metadata, "render_modes": modes, "render_fps": frame_rate(self._arena)}
         self._observe = observer(percept, self._arena)
         self.observation_space = self._observe.space
@@ -84,13 +86,13 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         start = given_poses(options, self._arena).get(0)
         super().reset(seed=seed)
         if seed is None and self._np_random_seed == -1:  # the user has set the generator
-            seed = int(self.np_random.integers(LARGEST))
+            seed = int(self.np_random.integers(MAX_SEED))
         elif seed is None and self._episode.now is None:
             seed = self.np_random_seed
         if seed is None:
-            self._episode.begin(self._place.place(self._end, start))
+            self._episode.begin(self._backend.place(self._end, start))
         else:
-            self._episode.begin(self._place.begin(run_seed(seed), start))
+            self._episode.begin(self._backend.begin(run_seed(seed), start))
         return self._look(), self._info()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -101,14 +103,14 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         wheels = motors(self.action_space, action)
         if episode.steps and episode.terminated:
             logger.warn("step() after the episode has terminated: reset() begins the next one")
-        episode.step(self._place.drive(*wheels))
+        episode.step(self._backend.drive(*wheels))
         return self._look(), self._reward(episode), episode.terminated, False, self._info()
 
     def render(self) -> np.ndarray | None:
         """A picture, (height, width, 3) uint8; None where it goes to a window."""
         if self.render_mode is None:
             logger.warn("render() without a render_mode shows nothing; give gymnasium.make one, as 'rgb_array'")
-        pose = self._place.pose
+        pose = self._backend.pose
         if self._canvas is None or self._episode.now is None or pose is None:
             return None
         picture = self._canvas.draw(pose, self._episode.now.sonar)
@@ -118,7 +120,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         return None
 
     def close(self) -> None:
-        self._place.close()
+        self._backend.close()
         if self._window is not None:
             self._window.close()
 
@@ -134,7 +136,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
 
     def _info(self) -> dict[str, Any]:
         """For people, not for learners: where the robot is (not on the bus, where a driver is not told)."""
-        pose, readings = self._place.pose, self._episode.now
+        pose, readings = self._backend.pose, self._episode.now
         place = {} if pose is None else {"pose": np.array(pose)}
         success = self._episode.terminated
         return {**place, "tick": readings.tick, "episode_number": readings.episode, "is_success": success}

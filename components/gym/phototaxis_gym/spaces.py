@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.error import Error
 from gymnasium.vector.utils import iterate
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 from phototaxis.task import (
     ACTIONS,
     MOTORS,
@@ -144,7 +144,7 @@ def motors(space: spaces.Space[Any], action: Any) -> tuple[float, float]:
     raise WrongAction(f"{action!r} is not in {space}")
 
 
-def motors_of_many(space: spaces.Space[Any], single: spaces.Space[Any], actions: Any, count: int) -> np.ndarray:
+def batch_motors(space: spaces.Space[Any], single: spaces.Space[Any], actions: Any, count: int) -> np.ndarray:
     """(count, 2): the wheels' commands of a batch of actions in `space`, each of them in `single`.
 
     Raises

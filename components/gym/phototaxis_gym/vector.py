@@ -9,18 +9,18 @@ from gymnasium.error import Error, ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 from phototaxis.task import BatchObservation, Episode
 from phototaxis.task.episode import RESET
 from phototaxis_sim import arenas
 
 from phototaxis_gym import MAX_EPISODE_STEPS
-from phototaxis_gym.draw import SIDE, Canvas, Window, frame_rate, tiles
+from phototaxis_gym.backend import BatchBackend, LocalBatchBackend
+from phototaxis_gym.draw import SIDE_PIXELS, Canvas, Window, frame_rate, tiles
 from phototaxis_gym.errors import EpisodeOver
-from phototaxis_gym.place import ManyHere, Places
-from phototaxis_gym.remote_many import ManyThere
+from phototaxis_gym.remote_many import RemoteBatchBackend
 from phototaxis_gym.resets import given_poses, reset_mask, row_seeds, run_seed
-from phototaxis_gym.spaces import actions, motors_of_many, observer, rewards, valid_percept, valid_steps
+from phototaxis_gym.spaces import actions, batch_motors, observer, rewards, valid_percept, valid_steps
 
 
 class LightSeekers(VectorEnv[Any, Any, Any]):
@@ -76,14 +76,14 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         self._reward, self.single_action_space = rewards(reward, valid_percept(percept)), actions(action)
         self._mode, self.render_mode = AutoresetMode(autoreset_mode), render_mode
         try:
-            self._place: Places = (
-                ManyThere(connect, world, timeout, num_envs)
+            self._backend: BatchBackend = (
+                RemoteBatchBackend(connect, world, timeout, num_envs)
                 if connect
-                else ManyHere(arenas.enter(arena or "paper", goal=False))
+                else LocalBatchBackend(arenas.load_checked(arena or "paper", goal=False))
             )
         except UserError as error:
             raise Error(str(error)) from None
-        self._arena = self._place.arena
+        self._arena = self._backend.arena
         fps = frame_rate(self._arena)
         self.metadata = {"render_modes": modes, "render_fps": fps, "autoreset_mode": self._mode}
         self._observe = observer(percept, self._arena)
@@ -91,8 +91,8 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._window = Window(fps) if render_mode == "human" else None
-        side = SIDE if self._window is None else max(2 * SIDE // int(np.ceil(np.sqrt(num_envs))), 1)
-        self._canvas = Canvas(self._arena, min(side, SIDE)) if render_mode else None
+        side = SIDE_PIXELS if self._window is None else max(2 * SIDE_PIXELS // int(np.ceil(np.sqrt(num_envs))), 1)
+        self._canvas = Canvas(self._arena, min(side, SIDE_PIXELS)) if render_mode else None
         self._seeds: list[int] | None = None
         self._episodes, self._ends = np.zeros(num_envs, int), np.zeros(num_envs, np.uint8)
 
@@ -119,7 +119,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         known = self.np_random_seed
         used = [known[row] if one is None or not mask[row] else one for row, one in enumerate(seeds)]
         if mask.all() and (self._episode.now is None or None not in seeds):
-            observation = self._place.begin([run_seed(one) for one in used], starts)
+            observation = self._backend.begin([run_seed(one) for one in used], starts)
             super().reset(seed=used[0])
             self._episodes = np.zeros(count, int)
             self._episode.begin(observation)
@@ -133,14 +133,14 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         """Hold an action for one control period."""
         if self._episode.now is None:
             raise ResetNeeded("reset() comes before step()")
-        motors = motors_of_many(self.action_space, self.single_action_space, actions, self.num_envs)
+        motors = batch_motors(self.action_space, self.single_action_space, actions, self.num_envs)
         fresh = self._ends > 0
         if self._mode == AutoresetMode.DISABLED and fresh.any():
             over = np.flatnonzero(fresh).tolist()
             raise EpisodeOver(f"the episodes of the robots {over} have ended: reset(options={{'reset_mask': …}}) first")
         self._episodes += fresh
         episode = self._episode
-        episode.step(self._place.drive(motors.T, self._ends))
+        episode.step(self._backend.drive(motors.T, self._ends))
         episode.begin(episode.now, fresh)
         seen, reward = self._look(), self._reward(episode)
         terminated, truncated = episode.terminated & ~fresh, episode.truncated
@@ -163,7 +163,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         if self._canvas is None:
             logger.warn("render() without a render_mode shows nothing; give gymnasium.make_vec one, as 'rgb_array'")
             return (None,) * self.num_envs
-        poses, sonar = np.asarray(self._place.poses).tolist(), self._episode.now.sonar.T.tolist()
+        poses, sonar = np.asarray(self._backend.poses).tolist(), self._episode.now.sonar.T.tolist()
         pictures = tuple(self._canvas.draw(pose, rays) for pose, rays in zip(poses, sonar, strict=True))
         if self._window is None:
             return pictures
@@ -172,14 +172,14 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
 
     def close_extras(self, **kwargs: Any) -> None:
         """Leave the world; `close` calls it."""
-        self._place.close()
+        self._backend.close()
         if self._window is not None:
             self._window.close()
 
     def _renew(self, mask: np.ndarray, seeds: dict[int, int], starts: dict[int, Any]) -> None:
         """Begin new episodes of some robots; the others see what they have seen."""
         ends = np.where(mask, np.where(self._ends > 0, self._ends, RESET), 0).astype(np.uint8)
-        pairs = zip(self._place.renew(ends, seeds, starts), self._episode.now, strict=True)
+        pairs = zip(self._backend.renew(ends, seeds, starts), self._episode.now, strict=True)
         self._episode.begin(BatchObservation(*(np.where(mask, new, old) for new, old in pairs)), mask)
         self._episodes[mask] += 1
         self._episodes[list(seeds)] = 0
@@ -192,9 +192,9 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
 
     def _info(self, mask: np.ndarray) -> dict[str, Any]:
         """The `info` of those robots as SyncVectorEnv has it: an array for each key, with a mask."""
-        poses, count = self._place.poses, self.num_envs
+        poses, count = self._backend.poses, self.num_envs
         columns = {} if poses is None else {"pose": poses.copy()}
-        columns["tick"] = np.full(count, self._place.tick)
+        columns["tick"] = np.full(count, self._backend.tick)
         columns["episode_number"] = self._episodes.copy()
         columns["is_success"] = self._episode.terminated
         return {**columns, **{f"_{key}": mask.copy() for key in columns}}

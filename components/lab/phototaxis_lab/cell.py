@@ -5,18 +5,18 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 from msgspec import Struct
-from phototaxis.messages import World
 from phototaxis.task import ACTIONS
+from phototaxis.wire.messages import World
 from phototaxis_agent.agent import Agent
-from phototaxis_agent.setup import Setup, make_setup
-from phototaxis_agent.stuck import watched
+from phototaxis_agent.setup import AgentSetup, make_setup
+from phototaxis_agent.watchdog import watchdog
 from phototaxis_sim import arenas
 
 from phototaxis_lab.loop import Loop
 from phototaxis_lab.measure import evaluate
 
 PLACEMENTS = 200
-CURVE = 100
+CURVE_POINTS = 100
 """Points of the curve of accumulated reward."""
 
 
@@ -32,13 +32,13 @@ class System(Struct, frozen=True):
     options: tuple[tuple[str, Any], ...] = ()
     """Options of the agent, (name, value), where they are not the learner's presets."""
 
-    def setup(self) -> Setup:
+    def setup(self) -> AgentSetup:
         """The agent's setup; UserError when an option does not fit."""
         chosen = {} if self.reward == "preset" else {"reward": self.reward}
         return make_setup(self.learner, percept=self.percept, **chosen, **dict(self.options))
 
     @classmethod
-    def of(cls, setup: Setup, arena: str) -> "System":
+    def of(cls, setup: AgentSetup, arena: str) -> "System":
         """The system of a setup, every option spelt out."""
         options = msgspec.to_builtins(setup.hyperparameters) | msgspec.to_builtins(setup.exploration)
         options["max_episode_steps"] = setup.task.max_episode_steps
@@ -46,7 +46,7 @@ class System(Struct, frozen=True):
 
     def check(self) -> None:
         """UserError when there is no such arena, learner or option, or when they do not go together."""
-        self.setup().agent(World(run="check", arena=arenas.enter(self.arena), seed=0, epochs=1))
+        self.setup().agent(World(run="check", arena=arenas.load_checked(self.arena), seed=0, epochs=1))
 
     def __str__(self) -> str:
         words = [self.learner, self.percept, *([self.reward] if self.reward != "preset" else [])]
@@ -114,14 +114,14 @@ def learn(cell: Cell) -> Learned:
     return Learned(agent, loop, rewards, speeds)
 
 
-@watched()
+@watchdog()
 def run(cell: Cell) -> Outcome:
     """Learn, freeze, measure on 200 fresh placements; everything follows from the cell."""
     agent, loop, rewards, speeds = learn(cell)
     meta, _ = agent.checkpoint()
     agent.policy.learning = False
     found = evaluate(loop.simulation.world.arena, agent.policy, PLACEMENTS, cell.seed)
-    marks = np.linspace(0, cell.epochs, CURVE + 1).astype(int)[1:] - 1
+    marks = np.linspace(0, cell.epochs, CURVE_POINTS + 1).astype(int)[1:] - 1
     return Outcome(
         seed=cell.seed,
         success_rate=found.success_rate,

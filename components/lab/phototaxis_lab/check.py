@@ -7,12 +7,13 @@ from typing import Annotated, Literal
 
 import zenoh
 from msgspec import Meta
-from phototaxis import doors, rights, wire
-from phototaxis.disk import make_folder, try_folder, write_whole
-from phototaxis.errors import UserError
-from phototaxis.options import parse
-from phototaxis.router import router_config, text
-from phototaxis.session import BusOptions, WorldNames
+from phototaxis.guard import exposure, rights
+from phototaxis.guard.router import router_config, text
+from phototaxis.runtime.disk import check_folder_writable, make_folder, write_atomic
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.session import BusOptions, WorldNames
+from phototaxis.wire import document
 
 ROUTER = "deploy/zenoh/router.json5"
 WIRE = "docs/wire.md"
@@ -34,9 +35,9 @@ class Options(BusOptions, kw_only=True):
     """rights, wire: write the file instead of comparing it"""
     ticks: Annotated[int, Meta(ge=10, le=100_000)] = 200
     """agent: how many ticks to ask"""
-    within: Annotated[float, Meta(gt=0, le=600)] = 1.0
+    answer_timeout: Annotated[float, Meta(gt=0, le=600)] = 1.0
     """agent: seconds in which a tick must be answered"""
-    patience: Annotated[float, Meta(gt=0, le=600)] = 20.0
+    agent_timeout: Annotated[float, Meta(gt=0, le=600)] = 20.0
     """agent: seconds to wait for one"""
 
 
@@ -47,7 +48,7 @@ def main(argv: Sequence[str]) -> int:
         from phototaxis_lab.check_agent import check
 
         bus = BusOptions(**{field: getattr(options, field) for field in BusOptions.__struct_fields__})
-        return check(bus, options.ticks, options.within, options.patience)
+        return check(bus, options.ticks, options.answer_timeout, options.agent_timeout)
     return _rights(options) if options.subject == "rights" else _wire(options)
 
 
@@ -78,17 +79,17 @@ def _rights(options: Options) -> int:
 
 def _refuse_gaps(file: Path, found: zenoh.Config) -> None:
     """UserError for what lets strangers in, or would where Zenoh's own `zenohd` reads the file."""
-    doors.refuse_open_doors(found, str(file))
-    for key in doors.DISCOVERY:
-        if doors.get(found, key) is None:
+    exposure.refuse_exposures(found, str(file))
+    for key in exposure.DISCOVERY:
+        if exposure.get(found, key) is None:
             raise UserError(f"{file}: {key} is left out, and zenohd turns it on; set it to false")
 
 
 def _wire(options: Options) -> int:
     file = Path(options.file or WIRE)
     if options.write:
-        _put(file, wire.page())
-    elif not file.is_file() or file.read_bytes() != wire.page().encode():
+        _put(file, document.page())
+    elif not file.is_file() or file.read_bytes() != document.page().encode():
         raise UserError(f"{file}: not up to date; write it anew with: phototaxis check wire --write")
     else:
         print(f"{file} is up to date", file=sys.stderr)
@@ -96,7 +97,7 @@ def _wire(options: Options) -> int:
 
 
 def _put(file: Path, content: str) -> None:
-    try_folder(file.parent, "--file")
+    check_folder_writable(file.parent, "--file")
     make_folder(file.parent)
-    write_whole(file, content.encode())
+    write_atomic(file, content.encode())
     print(file, file=sys.stderr)

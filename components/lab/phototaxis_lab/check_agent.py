@@ -5,18 +5,18 @@ import time
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from phototaxis.bus import Bus
-from phototaxis.codec import encode
-from phototaxis.errors import ComponentFailed, Unavailable
-from phototaxis.machine import Event
-from phototaxis.messages import Command, Control, ControlReply, Readings, Status, World, run_name
-from phototaxis.options import flags
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.errors import ComponentFailed, Unavailable
+from phototaxis.runtime.machine import Event
+from phototaxis.runtime.options import flags
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.codec import encode
+from phototaxis.wire.messages import Command, Control, ControlReply, Readings, Status, World, run_name
 from phototaxis_sensors.suite import SensorSuite
 from phototaxis_sim import arenas
 from phototaxis_sim.simulation import Simulation
 
-SILENCE = 0.5
+SILENCE_S = 0.5
 """Seconds in which something that must not come does not come."""
 
 
@@ -28,13 +28,13 @@ class Verdict(NamedTuple):
     """"" when it is kept."""
 
 
-def check(options: BusOptions, ticks: int, within: float, patience: float) -> int:
+def check(options: BusOptions, ticks: int, answer_timeout: float, agent_timeout: float) -> int:
     """Try the first agent that comes to the world `options.name`; a line for each clause.
 
     Raises
     ------
     Unavailable
-        when a run is up in that world, or no agent comes in `patience` seconds.
+        when a run is up in that world, or no agent comes in `agent_timeout` seconds.
     ComponentFailed
         when a clause is broken.
     """
@@ -48,7 +48,7 @@ def check(options: BusOptions, ticks: int, within: float, patience: float) -> in
         line = f"waiting for an agent in the world '{options.name}', as: phototaxis agent {' '.join(flags(options))}"
         print(line.rstrip(), file=sys.stderr, flush=True)
         broken = 0
-        for verdict in Trial(sim, sensors, within, patience).run(ticks):
+        for verdict in Trial(sim, sensors, answer_timeout, agent_timeout).run(ticks):
             broken += bool(verdict.fault)
             print(
                 f"{'FAIL' if verdict.fault else 'pass'}  {verdict.clause}{': ' if verdict.fault else ''}{verdict.fault}"
@@ -62,7 +62,7 @@ def check(options: BusOptions, ticks: int, within: float, patience: float) -> in
 def _refuse_a_run(options: BusOptions) -> None:
     """Raise Unavailable when there is a simulation already: the check is one itself, and two contradict each other."""
     with open_session("observer", options) as session, Bus(session, options.name, "observer", "check") as bus:
-        if bus.wait_for("sim", SILENCE):
+        if bus.wait_for("sim", SILENCE_S):
             raise Unavailable(
                 f"a run is up in the world '{options.name}', and this check plays the simulation itself; give it and "
                 "the agent a world of their own: --name trial"
@@ -72,8 +72,13 @@ def _refuse_a_run(options: BusOptions) -> None:
 class Trial:
     """Leads one agent through the clauses."""
 
-    def __init__(self, sim: Bus, sensors: Bus, within: float, patience: float):
-        self._sim, self._sensors, self._within, self._patience = sim, sensors, within, patience
+    def __init__(self, sim: Bus, sensors: Bus, answer_timeout: float, agent_timeout: float):
+        self._sim, self._sensors, self._answer_timeout, self._agent_timeout = (
+            sim,
+            sensors,
+            answer_timeout,
+            agent_timeout,
+        )
         self._world = World(run=run_name(), arena=arenas.load("paper"), seed=0, epochs=0)
         self._simulation = Simulation(self._world.arena, 0, self._world.run, 0)
         self._suite = SensorSuite(self._world)
@@ -93,33 +98,34 @@ class Trial:
         if first.fault:
             return
         yield Verdict("repeats its answer, byte for byte, when a tick is asked again", self._repeats())
-        yield Verdict(f"answers {ticks} ticks once each, each within {self._within:g} s", self._drives(ticks))
+        yield Verdict(f"answers {ticks} ticks once each, each within {self._answer_timeout:g} s", self._drives(ticks))
         yield Verdict("ends the episode when it has reached the light", self._reaches())
         yield Verdict("keeps silent about an older tick", self._older())
         yield Verdict("steps down when another one drives", self._steps_down())
 
     def _arrives(self) -> Verdict:
-        if not self._sim.wait_for("agent", self._patience):
+        if not self._sim.wait_for("agent", self._agent_timeout):
             raise Unavailable(
-                f"no agent came within {self._patience:g} s; it must declare the liveliness token NAME/alive/agent/ID"
+                f"no agent came within {self._agent_timeout:g} s; "
+                "it must declare the liveliness token NAME/alive/agent/ID"
             )
         return Verdict("declares its liveliness token", "")
 
     def _claims(self) -> Verdict:
         """The readings of a world without a driver, repeated, until a claim comes."""
         self._ask("")
-        self._await("control", self._patience)
-        fault = "" if self._agent else f"no claim within {self._patience:g} s"
+        self._await("control", self._agent_timeout)
+        fault = "" if self._agent else f"no claim within {self._agent_timeout:g} s"
         return Verdict("claims a free seat", fault)
 
     def _first(self) -> str:
         self._ask(self._agent)
-        return self._fault(self._await("command", self._patience))
+        return self._fault(self._await("command", self._agent_timeout))
 
     def _repeats(self) -> str:
         before = self._answer
         self._ask(self._agent)
-        after = self._await("command", self._within)
+        after = self._await("command", self._answer_timeout)
         if after is None:
             return "no answer"
         return "" if encode(before) == encode(after) else f"first {before}, then {after}"
@@ -130,19 +136,19 @@ class Trial:
             self._simulation.advance(answer.left, answer.right, answer.author, answer.end)
             self._ask(self._agent)
             began = time.monotonic()
-            fault = self._fault(self._await("command", self._within))
+            fault = self._fault(self._await("command", self._answer_timeout))
             if fault:
                 return f"tick {self._simulation.state.tick}: {fault}"
-            if time.monotonic() - began > self._within:
+            if time.monotonic() - began > self._answer_timeout:
                 return f"tick {self._simulation.state.tick}: late"
-        extra = self._await("command", SILENCE, repeat=False)
+        extra = self._await("command", SILENCE_S, repeat=False)
         return "" if extra is None else f"answered tick {extra.tick} twice without being asked again"
 
     def _reaches(self) -> str:
         answer = self._answer
         self._simulation.advance(answer.left, answer.right, answer.author, answer.end)
         self._ask(self._agent, light=(1.0, 1.0))
-        command = self._await("command", self._within)
+        command = self._await("command", self._answer_timeout)
         fault = self._fault(command)
         return fault or (
             "" if command is not None and command.end == "terminated" else f"its command does not end it: {command}"
@@ -154,14 +160,14 @@ class Trial:
         newest, self._asked = self._asked, None
         newest.tick -= 1
         self._sensors.put("readings", newest)
-        command = self._await("command", SILENCE, repeat=False)
+        command = self._await("command", SILENCE_S, repeat=False)
         newest.tick += 1
         return "" if command is None else f"it answered {command}"
 
     def _steps_down(self) -> str:
         self._simulation.advance(0.0, 0.0, self._agent, "terminated")
         self._ask("another")
-        command = self._await("command", SILENCE)
+        command = self._await("command", SILENCE_S)
         return "" if command is None else f"it answered {command}"
 
     def _ask(self, driver: str, light: tuple[float, float] | None = None) -> None:

@@ -6,13 +6,13 @@ from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta, Struct
-from phototaxis.arena import Arena
-from phototaxis.checkpoint import Meta as Checkpoint
-from phototaxis.checkpoint import load
-from phototaxis.errors import UserError, warn
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import Seed, World
-from phototaxis.options import parse_groups
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.checkpoint import CheckpointMetadata as Checkpoint
+from phototaxis.runtime.checkpoint import load
+from phototaxis.runtime.errors import UserError, warn
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.runtime.options import parse_groups
+from phototaxis.wire.messages import Seed, World
 
 
 class Options(Struct, kw_only=True):
@@ -42,8 +42,8 @@ def main(argv: Sequence[str]) -> int:
     options, fmus = parse_groups(groups, argv, "phototaxis evaluate", about, positional=["checkpoint"])
     from phototaxis_agent.policies import is_policy, load_policy
     from phototaxis_agent.setup import from_checkpoint
-    from phototaxis_agent.stuck import watched
-    from phototaxis_sensors.choice import choose
+    from phototaxis_agent.watchdog import watchdog
+    from phototaxis_sensors.choice import choose_sensors
     from phototaxis_sim import arenas
 
     from phototaxis_lab.measure import SEED_OFFSET, evaluate, measure
@@ -51,11 +51,11 @@ def main(argv: Sequence[str]) -> int:
 
     path = Path(options.checkpoint)
     if is_policy(path):
-        arena = arenas.enter(options.arena or "paper")
-        crowd = load_policy(path, options.trust, options.normalize).crowd(arena)
-        with choose(fmus) as sensors, Progress(options.max_episode_steps, "steps") as progress:
+        arena = arenas.load_checked(options.arena or "paper")
+        batch = load_policy(path, options.trust, options.normalize).batch(arena)
+        with choose_sensors(fmus) as sensors, Progress(options.max_episode_steps, "steps") as progress:
             found = measure(
-                arena, crowd, options.placements, options.seed, options.max_episode_steps, sensors, progress.add
+                arena, batch, options.placements, options.seed, options.max_episode_steps, sensors, progress.add
             )
         return tell(found, {"arena": options.arena or arena.name, "arena_digest": arena.digest}, options.json)
     if options.normalize:
@@ -66,7 +66,7 @@ def main(argv: Sequence[str]) -> int:
     world = World(run="evaluation", arena=arena, seed=options.seed + SEED_OFFSET, epochs=0)
     policy = setup.agent(world, learning=False).policy
     policy.take_over(meta, arrays, str(path))
-    with watched(), choose(fmus) as sensors, Progress(options.max_episode_steps, "steps") as progress:
+    with watchdog(), choose_sensors(fmus) as sensors, Progress(options.max_episode_steps, "steps") as progress:
         found = evaluate(
             arena, policy, options.placements, options.seed, options.max_episode_steps, sensors, progress.add
         )
@@ -100,7 +100,7 @@ def where(path: Path, meta: Checkpoint, given: str) -> Arena:
 
     if not given and meta.arena not in arenas.shipped():
         raise UserError(f"{path}: learned in the arena '{meta.arena}', which is not shipped; give its file: --arena")
-    arena = arenas.enter(given or meta.arena)
+    arena = arenas.load_checked(given or meta.arena)
     if other := meta.elsewhere(arena):
         if not given:
             raise UserError(f"{path}: {other}; give the file of the one, or the name of the other: --arena")

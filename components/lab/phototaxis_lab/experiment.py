@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta, field
-from phototaxis.errors import UserError
-from phototaxis.options import parse
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.options import parse
 
 from phototaxis_lab.running import SEEDS, Running, seed_range
 

@@ -22,12 +22,12 @@ def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
         missing = results.missing
         if found := len(cells) - len(missing):
             print(f"{folder}: {found} of {len(cells)} are done already", file=sys.stderr)
-        for place, outcome in watched([cells[index] for index in missing], running):
+        for place, outcome in with_progress([cells[index] for index in missing], running):
             results.add(missing[place], outcome)
     return results
 
 
-def watched(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int, Outcome]]:
+def with_progress(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int, Outcome]]:
     """`parallel.outcomes`, within a `cluster`, while the progress in epochs is shown."""
     if cells:
         print(f"agents that learn and are measured: {len(cells)}", file=sys.stderr, flush=True)

@@ -2,10 +2,10 @@
 
 import time
 
-from phototaxis.arena import Arena
-from phototaxis.messages import EndedEpisode, World
+from phototaxis.geometry.arena import Arena
+from phototaxis.wire.messages import EndedEpisode, World
 from phototaxis_agent.agent import Agent
-from phototaxis_agent.setup import Setup
+from phototaxis_agent.setup import AgentSetup
 from phototaxis_sensors.suite import Make, SensorSuite, built_in
 from phototaxis_sim.simulation import Simulation
 
@@ -31,7 +31,7 @@ class Loop:
         self.agent(self.sensors(self.simulation.state))
 
 
-def train(setup: Setup, arena: Arena, seed: int, epochs: int, make: Make = built_in) -> tuple[Loop, float]:
+def train(setup: AgentSetup, arena: Arena, seed: int, epochs: int, make: Make = built_in) -> tuple[Loop, float]:
     """Learn for `epochs` steps; the loop as it ended, and the seconds it took."""
     loop = Loop(arena, setup.agent(World(run="lab", arena=arena, seed=seed, epochs=epochs)), seed, epochs, make=make)
     began = time.perf_counter()

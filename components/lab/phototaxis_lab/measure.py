@@ -5,13 +5,13 @@ from collections.abc import Callable
 
 import numpy as np
 from msgspec import Struct
-from phototaxis.arena import Arena
-from phototaxis.messages import World
+from phototaxis.geometry.arena import Arena
 from phototaxis.task import GOAL_LIGHT, BatchObservation, Episode
-from phototaxis_agent.crowd import CrowdAgent
+from phototaxis.wire.messages import World
+from phototaxis_agent.batch_agent import BatchAgent
 from phototaxis_agent.policy import Policy
-from phototaxis_sensors.choice import BuiltInChoice, Choice
-from phototaxis_sim.crowd import Crowd
+from phototaxis_sensors.choice import BuiltInFactory, SensorFactory
+from phototaxis_sim.batch_physics import BatchPhysics
 from phototaxis_sim.physics import Physics, Pose
 
 SEED_OFFSET = 1_000_000_007
@@ -57,7 +57,7 @@ def direct_steps(arena: Arena, start: Pose) -> float:
     return max(fewest, 1.0)
 
 
-BUILT_IN = BuiltInChoice()
+BUILT_IN = BuiltInFactory()
 
 
 def evaluate(
@@ -66,7 +66,7 @@ def evaluate(
     placements: int,
     seed: int,
     max_episode_steps: int = MAX_EPISODE_STEPS,
-    sensors: Choice = BUILT_IN,
+    sensors: SensorFactory = BUILT_IN,
     stepped: Callable[[], object] = lambda: None,
 ) -> Evaluation:
     """Place `placements` robots at random, and let the frozen policy drive each of them for an episode.
@@ -75,8 +75,8 @@ def evaluate(
     """
     if policy.learning:
         raise ValueError("a policy that is evaluated must not learn")
-    crowd = CrowdAgent(policy, arena.sensing.near, placements, seed)
-    return measure(arena, crowd, placements, seed, max_episode_steps, sensors, stepped)
+    batch = BatchAgent(policy, arena.sensing.near, placements, seed)
+    return measure(arena, batch, placements, seed, max_episode_steps, sensors, stepped)
 
 
 Drive = Callable[[Episode], np.ndarray]
@@ -89,24 +89,24 @@ def measure(
     placements: int,
     seed: int,
     max_episode_steps: int = MAX_EPISODE_STEPS,
-    sensors: Choice = BUILT_IN,
+    sensors: SensorFactory = BUILT_IN,
     stepped: Callable[[], object] = lambda: None,
 ) -> Evaluation:
     """Place `placements` robots at random, as `evaluate` does, and let `drive` drive them."""
     seed += SEED_OFFSET
     physics = Physics(arena)
     starts = [physics.random_pose(np.random.default_rng((seed, number))) for number in range(placements)]
-    crowd = Crowd(arena, starts)
-    suite = sensors.crowd(World(run="evaluation", arena=arena, seed=seed, epochs=0), placements)
+    batch = BatchPhysics(arena, starts)
+    suite = sensors.batch(World(run="evaluation", arena=arena, seed=seed, epochs=0), placements)
 
     def observe(tick: int) -> BatchObservation:
-        return BatchObservation(*suite(tick, crowd.poses), crowd.front, crowd.rear)
+        return BatchObservation(*suite(tick, batch.poses), batch.front, batch.rear)
 
     episode = Episode(max_episode_steps, placements)
     episode.begin(observe(0))
     reached, steps, tick = episode.terminated, episode.steps, 0
     while not (reached | episode.truncated).all():
-        crowd.drive(*np.where(reached, 0.0, drive(episode).T))
+        batch.drive(*np.where(reached, 0.0, drive(episode).T))
         stepped()
         tick += 1
         episode.step(observe(tick))

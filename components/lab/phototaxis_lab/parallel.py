@@ -6,11 +6,11 @@ from typing import Any
 
 import joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
-from phototaxis.errors import ComponentFailed, Unavailable
+from phototaxis.runtime.errors import ComponentFailed, Unavailable
 
 from phototaxis_lab.cell import Cell, Outcome, run
 
-PATIENCE = 10.0
+SCHEDULER_TIMEOUT_S = 10.0
 """Seconds to wait for a Dask scheduler."""
 
 
@@ -54,7 +54,7 @@ class _Dask(AbstractContextManager[None]):
         from distributed import Client
 
         try:
-            self._client = Client(scheduler, timeout=PATIENCE, set_as_default=True)
+            self._client = Client(scheduler, timeout=SCHEDULER_TIMEOUT_S, set_as_default=True)
         except (OSError, ValueError, TimeoutError) as error:
             raise Unavailable(f"--scheduler {scheduler}: no Dask scheduler answers there: {error}") from None
         self._config = joblib.parallel_config(backend="dask")

@@ -6,7 +6,7 @@ from shutil import get_terminal_size
 
 from tqdm import tqdm
 
-PATIENCE_S = 1.0
+QUIET_S = 1.0
 """A computation that is shorter than this shows nothing."""
 LINE_EVERY_S = 15.0
 
@@ -27,7 +27,7 @@ class Progress:
         self._bar = None
         if total > 0 and sys.stderr.isatty():
             width, height = get_terminal_size()  # 80 × 24 for terminals that say 0 × 0, where tqdm shows nothing
-            self._bar = tqdm(total=total, unit=f" {unit}", unit_scale=True, delay=PATIENCE_S, ncols=width, nrows=height)
+            self._bar = tqdm(total=total, unit=f" {unit}", unit_scale=True, delay=QUIET_S, ncols=width, nrows=height)
 
     def __enter__(self) -> "Progress":
         return self

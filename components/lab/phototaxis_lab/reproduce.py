@@ -5,8 +5,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from phototaxis.disk import make_folder, try_folder
-from phototaxis.options import parse
+from phototaxis.runtime.disk import check_folder_writable, make_folder
+from phototaxis.runtime.options import parse
 
 from phototaxis_lab.running import SEEDS, Running, seed_range
 
@@ -29,8 +29,8 @@ def main(argv: Sequence[str]) -> int:
     from phototaxis_lab.grid import by_system, compute
     from phototaxis_lab.reproduction import page, plan
 
-    try_folder(out, "--out")
-    try_folder(Path(options.results), "--results")
+    check_folder_writable(out, "--out")
+    check_folder_writable(Path(options.results), "--results")
     parts = {part: plan.cells(planned, seeds) for part, planned in plan.PARTS.items()}
     parts["fresh"] = plan.cells(plan.FRESH, plan.fresh_seeds(seeds))
     found = {}

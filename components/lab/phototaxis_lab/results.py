@@ -11,9 +11,9 @@ from typing import Any
 
 import msgspec
 from msgspec import Struct
-from phototaxis.disk import append_whole, make_folder, try_folder, unwritten, write_whole
-from phototaxis.errors import Unavailable, UserError, warn
-from phototaxis.words import plain
+from phototaxis.runtime.disk import append_atomic, check_folder_writable, make_folder, write_atomic, write_failure
+from phototaxis.runtime.errors import Unavailable, UserError, warn
+from phototaxis.runtime.phrases import plain
 from phototaxis_sim import arenas
 
 from phototaxis_lab.cell import Cell, Outcome, System
@@ -49,7 +49,7 @@ class Results:
     def __init__(self, folder: Path, cells: Sequence[Cell]):
         self._path, self.cells = folder / "results.jsonl", list(cells)
         self._waiting: list[bytes] = []
-        try_folder(folder, "--out", keep=True)
+        check_folder_writable(folder, "--out", keep=True)
         make_folder(folder)
         try:
             self._extend(folder / "grid.json")
@@ -73,7 +73,7 @@ class Results:
                 "give another folder, or remove this one"
             )
         if ours.keys() - known.keys():
-            write_whole(file, json.dumps({"systems": known | ours}, indent=1).encode())
+            write_atomic(file, json.dumps({"systems": known | ours}, indent=1).encode())
 
     def _read(self) -> dict[int, Outcome]:
         """What is done, by the index of the cell; a line that a kill left unfinished is dropped."""
@@ -119,9 +119,9 @@ class Results:
         """
         while self._waiting:
             try:
-                append_whole(self._path, self._waiting[0])
+                append_atomic(self._path, self._waiting[0])
             except OSError as error:
-                raise unwritten(self._path, error) from None
+                raise write_failure(self._path, error) from None
             self._waiting.pop(0)
 
 
@@ -145,7 +145,7 @@ def alone_in(folder: Path) -> Iterator[None]:
     UserError
         when the folder cannot be used.
     """
-    try_folder(folder, "--out", keep=True)
+    check_folder_writable(folder, "--out", keep=True)
     with ExitStack() as stack:
         try:
             lock = os.open(folder, os.O_RDONLY)

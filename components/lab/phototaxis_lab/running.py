@@ -3,7 +3,7 @@
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
-from phototaxis.errors import UserError
+from phototaxis.runtime.errors import UserError
 
 SEEDS = Annotated[
     str, Meta(pattern=r"^[0-9]+:[0-9]+$", description="A:B, the seeds from A to B − 1", examples=["0:20"])

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta
-from phototaxis.checkpoint import save
-from phototaxis.disk import try_file
-from phototaxis.errors import UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import Seed
+from phototaxis.runtime.checkpoint import save
+from phototaxis.runtime.disk import check_writable
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.wire.messages import Seed
 
 from phototaxis_lab.running import SEEDS, Running, seed_range
 
@@ -40,18 +40,18 @@ def main(argv: Sequence[str]) -> int:
     if options.checkpoint and options.seeds:
         raise UserError("--checkpoint keeps one learner, --seeds makes many; give one of the two")
     if options.checkpoint:
-        try_file(Path(options.checkpoint), "--checkpoint")
+        check_writable(Path(options.checkpoint), "--checkpoint")
     if options.seeds and fmus != FmuOptions():
         raise UserError("--seeds makes many learners at once, with the built-in sensors; leave the FMU out")
-    from phototaxis_sensors.choice import choose
+    from phototaxis_sensors.choice import choose_sensors
     from phototaxis_sim import arenas
 
-    arena, fault = arenas.enter(options.arena), None
+    arena, fault = arenas.load_checked(options.arena), None
     if options.seeds:
-        found = many(options, setup)
+        found = train_seeds(options, setup)
     else:
-        with choose(fmus) as make:
-            found, fault = one(options, setup, arena, make)
+        with choose_sensors(fmus) as make:
+            found, fault = train_seed(options, setup, arena, make)
     if options.json:
         print(json.dumps(found), flush=True)
     if fault:
@@ -59,13 +59,13 @@ def main(argv: Sequence[str]) -> int:
     return 0
 
 
-def one(options: Options, setup: Any, arena: Any, make: Any) -> tuple[dict[str, Any], UserError | None]:
+def train_seed(options: Options, setup: Any, arena: Any, make: Any) -> tuple[dict[str, Any], UserError | None]:
     """One seed: hashes, rate and, if wanted, the checkpoint; and why that could not be written."""
-    from phototaxis_agent.stuck import watched
+    from phototaxis_agent.watchdog import watchdog
 
     from phototaxis_lab.loop import train
 
-    with watched():
+    with watchdog():
         loop, seconds = train(setup, arena, options.seed, options.epochs, make)
         meta, arrays = loop.agent.checkpoint()
         kept, fault = options.checkpoint or None, None
@@ -98,16 +98,16 @@ def one(options: Options, setup: Any, arena: Any, make: Any) -> tuple[dict[str, 
     return found, fault
 
 
-def many(options: Options, setup: Any) -> dict[str, Any]:
+def train_seeds(options: Options, setup: Any) -> dict[str, Any]:
     """Many seeds: the success of each, and what they come to."""
     from phototaxis_lab.cell import Cell, System
-    from phototaxis_lab.grid import summary, watched
+    from phototaxis_lab.grid import summary, with_progress
     from phototaxis_lab.parallel import cluster
 
     system = System.of(setup, options.arena)
     cells = [Cell(system, options.epochs, seed) for seed in seed_range(options.seeds)]
     with cluster(options.backend, options.scheduler):
-        outcomes = [outcome for _, outcome in sorted(watched(cells, options))]
+        outcomes = [outcome for _, outcome in sorted(with_progress(cells, options))]
     fields = "seed", "success_rate", "within_100", "steps_mean", "path_ratio", "learner_hash"
     seeds = [{field: getattr(outcome, field) for field in fields} for outcome in outcomes]
     found = {"learner": system.learner, "epochs": options.epochs, "seeds": seeds, **summary(outcomes)}

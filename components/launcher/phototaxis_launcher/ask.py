@@ -6,11 +6,11 @@ from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
-from phototaxis.bus import Bus
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.messages import Control, ControlReply, Seed, Status
-from phototaxis.options import parse
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.messages import Control, ControlReply, Seed, Status
 
 from phototaxis_launcher.progress import success
 

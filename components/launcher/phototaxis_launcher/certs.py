@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta, Struct
-from phototaxis.disk import make_folder, try_folder, unwritten
-from phototaxis.errors import UserError
-from phototaxis.options import parse
-from phototaxis.rights import subject
-from phototaxis.roles import ROLES
-from phototaxis.router import Auth, client_config, router_config, text
-from phototaxis.session import WorldNames
+from phototaxis.guard.rights import subject
+from phototaxis.guard.router import Auth, client_config, router_config, text
+from phototaxis.runtime.disk import check_folder_writable, make_folder, write_failure
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.roles import ROLES
+from phototaxis.runtime.session import WorldNames
 
 MADE_BY = "phototaxis certs"
 
@@ -46,13 +46,13 @@ def main(argv: Sequence[str]) -> int:
     folder = Path(options.out).resolve()
     if folder.exists():
         raise UserError(f"--out {options.out}: exists already; remove it or choose another folder")
-    try_folder(folder, "--out")
+    check_folder_writable(folder, "--out")
     make_folder(folder, 0o700)
     try:
         make(folder, list(dict.fromkeys(options.worlds.split(","))), options.host, options.listen, options.port)
     except OSError as error:
         shutil.rmtree(folder, ignore_errors=True)
-        raise unwritten(folder, error) from None
+        raise write_failure(folder, error) from None
     print(
         f"{folder}: router-mtls.json5 and router-password.json5 for `phototaxis router --zenoh-config`, and for each "
         f"component WORLD.ROLE.mtls.json5 and WORLD.ROLE.password.json5 for its --zenoh-config",

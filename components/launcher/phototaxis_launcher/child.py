@@ -8,14 +8,14 @@ from collections import deque
 from pathlib import Path
 from typing import IO
 
-from phototaxis.component import made_up
-from phototaxis.disk import try_file, unwritten
-from phototaxis.errors import ERROR, WARNING, ComponentFailed, Unavailable, UserError
+from phototaxis.runtime.component import unique_name
+from phototaxis.runtime.disk import check_writable, write_failure
+from phototaxis.runtime.errors import ERROR, WARNING, ComponentFailed, Unavailable, UserError
 
-RESTARTS = 3
+MAX_RESTARTS = 3
 WITHIN_S = 20.0
 """A component that dies more than RESTARTS times within this many seconds keeps dying."""
-MENDABLE = {2: UserError, 3: Unavailable, 4: ComponentFailed}
+USER_ERRORS = {2: UserError, 3: Unavailable, 4: ComponentFailed}
 """Exit codes by which a component says in a line why it ends; it is not restarted, it would end the same."""
 
 
@@ -46,14 +46,14 @@ class Child:
         self._log, self._read = folder / f"{name}.log", 0
         self.idents: list[str] = []
         self.left = False
-        self._deaths: deque[float] = deque(maxlen=RESTARTS + 1)
+        self._deaths: deque[float] = deque(maxlen=MAX_RESTARTS + 1)
         self.restarts = 0
         self.process: subprocess.Popen[bytes] | None = None
 
     def start(self, *extra: str) -> None:
         """Start the process in a session of its own, so that Ctrl-C reaches the launcher alone."""
         if self.label:
-            self.idents.append(made_up(self.label))
+            self.idents.append(unique_name(self.label))
             extra = *extra, f"--ident={self.idents[-1]}"
         with self._open_log() as log:
             self.process = subprocess.Popen(
@@ -69,7 +69,7 @@ class Child:
         try:
             return self._log.open("ab")
         except OSError as error:
-            raise unwritten(self._log, error) from None
+            raise write_failure(self._log, error) from None
 
     def watch(self) -> bool:
         """Restart the process if it has died; whether it had to. One that may leave and did has `left`.
@@ -87,8 +87,8 @@ class Child:
         if code == 0 and self._may_leave:
             self.left = True
             return False
-        if code in MENDABLE:
-            raise MENDABLE[code](self.fault())
+        if code in USER_ERRORS:
+            raise USER_ERRORS[code](self.fault())
         self.bring_back()
         return True
 
@@ -103,7 +103,7 @@ class Child:
         if self.process is None:
             return
         self._deaths.append(time.monotonic())
-        if len(self._deaths) > RESTARTS and self._deaths[-1] - self._deaths[0] < WITHIN_S:
+        if len(self._deaths) > MAX_RESTARTS and self._deaths[-1] - self._deaths[0] < WITHIN_S:
             who = f"{self.name} (learner {self.label})" if self.label else self.name
             words = self.last_words()
             raise ComponentFailed(
@@ -114,17 +114,17 @@ class Child:
         self.restarts += 1
         self.start("--restarted")
 
-    def stop(self, patience: float) -> None:
-        """Ask the process to end, and end it when it does not within `patience` seconds."""
+    def stop(self, timeout: float) -> None:
+        """Ask the process to end, and end it when it does not within `timeout` seconds."""
         if self.process is None:
             return
         if self.process.poll() is None:
             self.process.terminate()
             try:
-                self.process.wait(patience)
+                self.process.wait(timeout)
             except subprocess.TimeoutExpired:
                 print(
-                    f"phototaxis: {self.name} did not end within {patience:g} s and was killed",
+                    f"phototaxis: {self.name} did not end within {timeout:g} s and was killed",
                     file=sys.stderr,
                 )
                 self.process.kill()
@@ -133,7 +133,7 @@ class Child:
             self.process.stdin.close()
 
     def warnings(self) -> list[str]:
-        """The warnings (`phototaxis.errors.warn`) that it wrote since this was asked last."""
+        """The warnings (`phototaxis.runtime.errors.warn`) that it wrote since this was asked last."""
         try:
             with self._log.open("rb") as log:
                 log.seek(self._read)
@@ -152,7 +152,7 @@ class Child:
 
     def fault(self) -> str:
         """The line with which it ended because of something that the user can mend; "" when it did not."""
-        if self.process is None or self.process.returncode not in MENDABLE:
+        if self.process is None or self.process.returncode not in USER_ERRORS:
             return ""
         said = [line for line in self.tail(20).splitlines() if line.startswith(ERROR)]
         if said:
@@ -161,7 +161,7 @@ class Child:
 
     def _why_no_word(self) -> str:
         try:
-            try_file(self._log, "its log")
+            check_writable(self._log, "its log")
         except UserError as error:
             return str(error)
         return f"see {self._log}"

@@ -8,9 +8,9 @@ from importlib.metadata import requires
 from typing import NamedTuple
 
 from phototaxis import __version__
-from phototaxis.errors import UserError, leave, one_line
-from phototaxis.roles import COMPONENTS
-from phototaxis.words import known
+from phototaxis.runtime.errors import UserError, leave, one_line
+from phototaxis.runtime.phrases import known
+from phototaxis.runtime.roles import COMPONENTS
 
 
 class Verb(NamedTuple):

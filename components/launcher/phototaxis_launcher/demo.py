@@ -9,29 +9,29 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from phototaxis.bus import Bus
-from phototaxis.checkpoint import Meta, load
-from phototaxis.errors import ComponentFailed
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import Control, Status
-from phototaxis.options import flags
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.checkpoint import CheckpointMetadata, load
+from phototaxis.runtime.errors import ComponentFailed
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.runtime.options import flags
+from phototaxis.wire.messages import Control, Status
 
 from phototaxis_launcher.options import UpOptions, parse
-from phototaxis_launcher.places import places, program
+from phototaxis_launcher.paths import program, run_paths
 from phototaxis_launcher.progress import Progress
 from phototaxis_launcher.show import Show
 from phototaxis_launcher.up import Run
 
-TICKS_A_SECOND = 10.0
+TICKS_PER_SECOND = 10.0
 """What eyes can follow."""
-FIRST, LAST = 150, 300
+FIRST_EPOCHS, LAST_EPOCHS = 150, 300
 """Epochs at the beginning and at the end of learning that are shown slowly."""
 SEEN = f"""\
 What is to be seen: on the left the arena with its light, the robot with its sonar rays, its trail coloured by reward;
 in the middle the share of episodes that reached the light, rewards and light; on the right what the robot has learned.
-The first and the last part are shown slowly, {TICKS_A_SECOND:g} steps a second."""
+The first and the last part are shown slowly, {TICKS_PER_SECOND:g} steps a second."""
 PLACEMENTS = 200
-PAPERS_EPOCHS = 3000
+PAPER_EPOCHS = 3000
 """Learning steps after which the paper measures its Q-table on the simple percept."""
 
 
@@ -46,7 +46,7 @@ def main(argv: Sequence[str]) -> int:
         print(json.dumps({**result, "evaluation": show.found}), flush=True)
     elif show.found is None:
         print("stopped before the end; nothing is evaluated", file=sys.stderr)
-        print(*places(result), sep="\n", file=sys.stderr)
+        print(*run_paths(result), sep="\n", file=sys.stderr)
     return run.end(status)
 
 
@@ -65,8 +65,8 @@ class Story(Show):
 
     def __init__(self, options: UpOptions, fmus: FmuOptions, stays: bool, paced: bool):
         self._options, self._fmus, self._stays = options, fmus, stays
-        self._fast_from = min(FIRST, options.epochs)
-        self._slow_from = max(options.epochs - LAST, self._fast_from)
+        self._fast_from = min(FIRST_EPOCHS, options.epochs)
+        self._slow_from = max(options.epochs - LAST_EPOCHS, self._fast_from)
         self._paced, self._chapter = paced, 0
         self._before, self._step_at, self._pause_at = (0.0, 0), math.inf, math.inf
         self.found: dict[str, Any] | None = None
@@ -86,7 +86,7 @@ class Story(Show):
             self._step_at, self._pause_at = time.monotonic(), math.inf
         if now >= self._step_at:
             bus.control(Control(verb="step"))
-            self._step_at = max(self._step_at + 1 / TICKS_A_SECOND, now)
+            self._step_at = max(self._step_at + 1 / TICKS_PER_SECOND, now)
 
     def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
         """Change the speed where a chapter ends, and say what is to be seen in the next."""
@@ -148,14 +148,14 @@ class Story(Show):
             if is_the_papers(load(Path(result["checkpoint"]))[0], self._options, self._fmus):
                 lines.append('The paper reports "upwards of 80%" for this system (section 6.2).')
             lines.append(f"Outcomes differ by seed: `{program()} train --seeds 0:20` shows twenty of them.")
-        return [*lines, "", *(f"  {line}" for line in places(result)), ""]
+        return [*lines, "", *(f"  {line}" for line in run_paths(result)), ""]
 
 
-def is_the_papers(meta: Meta, options: UpOptions, fmus: FmuOptions) -> bool:
+def is_the_papers(meta: CheckpointMetadata, options: UpOptions, fmus: FmuOptions) -> bool:
     """Whether a run was of the system for which the paper reports its 80%."""
     system = (meta.learner, meta.percept, meta.arena, options.epochs, options.robots, options.swap)
     return (
-        system == ("qtable", "simple", "paper", PAPERS_EPOCHS, 1, "")
+        system == ("qtable", "simple", "paper", PAPER_EPOCHS, 1, "")
         and meta.reward in ("own", "difference")
         and fmus == FmuOptions()
     )

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from phototaxis.disk import make_folder, try_folder, unwritten
-from phototaxis.errors import ComponentFailed, UserError
-from phototaxis.messages import run_name
+from phototaxis.runtime.disk import check_folder_writable, make_folder, write_failure
+from phototaxis.runtime.errors import ComponentFailed, UserError
+from phototaxis.wire.messages import run_name
 
 
 class RunFolder:
@@ -25,7 +25,7 @@ class RunFolder:
 
     def __init__(self, out: Path):
         self._made = [part for part in (out.resolve(), *out.resolve().parents) if not part.exists()]
-        try_folder(out, "--out", keep=True)  # taken away again, it might be missing to a run that starts now
+        check_folder_writable(out, "--out", keep=True)  # taken away again, it might be missing to a run that starts now
         self.path = self._fresh(out.resolve())
         self.begun = False
 
@@ -70,4 +70,4 @@ class RunFolder:
             except (FileExistsError, FileNotFoundError):  # another run took the name, or `out` away
                 continue
             except OSError as error:
-                raise unwritten(folder, error) from None
+                raise write_failure(folder, error) from None

@@ -3,13 +3,13 @@
 import time
 from collections.abc import Sequence
 
-from phototaxis.bus import Bus
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.messages import Control
-from phototaxis.options import parse
-from phototaxis.roles import COMPONENTS
-from phototaxis.session import BusOptions, open_session
-from phototaxis.words import known
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.phrases import known
+from phototaxis.runtime.roles import COMPONENTS
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.messages import Control
 
 ANSWERS_WITHIN_S = 3.0
 """A component of which nothing is heard for so long is not healthy."""

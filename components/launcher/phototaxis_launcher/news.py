@@ -1,8 +1,8 @@
 """What is new in the statuses of a run, said once: warnings, who is alive, another run, a part that is too slow."""
 
-from phototaxis.errors import warn
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import Status
+from phototaxis.runtime.errors import warn
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.wire.messages import Status
 
 from phototaxis_launcher.folder import RunFolder
 from phototaxis_launcher.progress import Progress

@@ -6,16 +6,16 @@ from importlib import import_module
 from typing import Annotated
 
 from msgspec import Meta
-from phototaxis.errors import UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import MAX_ROBOTS, Count, Seed
-from phototaxis.options import Parser, add_options, convert, flags, peek
-from phototaxis.session import BusOptions
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.runtime.options import Parser, add_options, convert, flags, peek
+from phototaxis.runtime.session import BusOptions
+from phototaxis.wire.messages import MAX_ROBOTS, Count, Seed
 
 PORT = Annotated[int, Meta(ge=-1, le=65535)]
-ALONE = ("--checkpoint", "--policy", "--standby", "--take-over", "--at", "--worlds", "--ident")
+STANDALONE_OPTIONS = ("--checkpoint", "--policy", "--standby", "--take-over", "--at", "--worlds", "--ident")
 """Options of an agent that is started alone; the launcher gives its own agents theirs."""
-SWAPS = re.compile(r"(?P<tick>[0-9]+):(?P<learner>[^:,\s]+)")
+SWAP_PATTERN = re.compile(r"(?P<tick>[0-9]+):(?P<learner>[^:,\s]+)")
 
 
 class UpOptions(BusOptions, kw_only=True):
@@ -71,7 +71,7 @@ def parse(argv: Sequence[str], prog: str = "phototaxis up") -> tuple[UpOptions, 
 def for_ours(words: list[str]) -> list[str]:
     """Words for an agent that the launcher starts; UserError when one is for an agent that is started alone."""
     for word in words:
-        if (option := word.split("=")[0]) in ALONE:
+        if (option := word.split("=")[0]) in STANDALONE_OPTIONS:
             raise UserError(f"{option} is for an agent that is started alone, beside a run: phototaxis agent {option}")
     return words
 
@@ -86,7 +86,7 @@ def successor(first: list[str], words: list[str]) -> list[str]:
 
 def swap_plan(text: str) -> list[tuple[int, str]]:
     """The ticks and learners of TICK:LEARNER,…; UserError when it is something else."""
-    found = [SWAPS.fullmatch(part) for part in text.split(",")] if text else []
+    found = [SWAP_PATTERN.fullmatch(part) for part in text.split(",")] if text else []
     plan = [(int(one["tick"]), one["learner"]) for one in found if one]
     if len(plan) < len(found) or sorted({tick for tick, _ in plan}) != [tick for tick, _ in plan]:
         raise UserError(f"--swap {text}: expected TICK:LEARNER with growing ticks, as in 1000:qtable,2000:dqn")

@@ -1,10 +1,10 @@
 """The processes of a run: one for each component of the table of roles, and any number of agents."""
 
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import Status
-from phototaxis.options import flags
-from phototaxis.roles import COMPONENTS
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.runtime.options import flags
+from phototaxis.runtime.roles import COMPONENTS
+from phototaxis.wire.messages import Status
 
 from phototaxis_launcher.child import Child
 from phototaxis_launcher.folder import RunFolder

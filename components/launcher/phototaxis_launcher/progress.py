@@ -3,7 +3,7 @@
 import sys
 import time
 
-from phototaxis.messages import Status
+from phototaxis.wire.messages import Status
 
 LINE_EVERY_S = 2.0
 

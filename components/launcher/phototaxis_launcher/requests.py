@@ -1,7 +1,7 @@
 """Requests to swap the learner: each starts an agent, and is answered when that agent drives, or cannot."""
 
-from phototaxis.machine import Event
-from phototaxis.messages import Launch, LaunchReply, Status
+from phototaxis.runtime.machine import Event
+from phototaxis.wire.messages import LaunchReply, LaunchRequest, Status
 
 from phototaxis_launcher.child import Child
 from phototaxis_launcher.processes import Processes
@@ -17,7 +17,7 @@ class SwapRequests:
 
     def begin(self, event: Event) -> None:
         """Start an agent that takes over."""
-        request: Launch | None = event.message
+        request: LaunchRequest | None = event.message
         if request is None or event.reply is None:
             return
         child = self._processes.another_agent(request.words)

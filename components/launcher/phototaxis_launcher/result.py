@@ -2,16 +2,16 @@
 
 from typing import Any
 
-from phototaxis.checkpoint import load
-from phototaxis.errors import INTERRUPTED, ComponentFailed
-from phototaxis.messages import Status
+from phototaxis.runtime.checkpoint import load
+from phototaxis.runtime.errors import EXIT_INTERRUPTED, ComponentFailed
+from phototaxis.wire.messages import Status
 
 from phototaxis_launcher.folder import RunFolder
 from phototaxis_launcher.options import UpOptions
-from phototaxis_launcher.places import places
+from phototaxis_launcher.paths import run_paths
 from phototaxis_launcher.processes import Processes
 
-MOSTLY = 0.95
+MAX_LATE_SHARE = 0.95
 """Share of ticks without a command in time from which on a run in real time has failed."""
 
 
@@ -64,7 +64,7 @@ def summary(result: dict[str, Any]) -> list[str]:
         f"{result['ticks_per_second']} ticks/s"
     )
     late = [f"late        {result['late_ticks']} ticks without a command in time"] if result["late_ticks"] else []
-    return [line, *late, *places(result)]
+    return [line, *late, *run_paths(result)]
 
 
 def exit_code(status: Status, processes: Processes, interrupted: bool) -> int:
@@ -79,8 +79,8 @@ def exit_code(status: Status, processes: Processes, interrupted: bool) -> int:
     for fault in processes.faults():
         raise fault
     if interrupted:
-        return INTERRUPTED
-    if status.late > MOSTLY * status.tick:
+        return EXIT_INTERRUPTED
+    if status.late > MAX_LATE_SHARE * status.tick:
         part = "sensors" if 2 * status.late_sensors > status.late else "agent"
         line = f"only {status.tick - status.late} of {status.tick} ticks had a command in time"
         raise ComponentFailed(

@@ -4,9 +4,9 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from phototaxis.errors import INTERRUPTED
-from phototaxis.options import parse
-from phototaxis.session import BusOptions, open_router
+from phototaxis.runtime.errors import EXIT_INTERRUPTED
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.session import BusOptions, open_router
 
 
 class Options(BusOptions, kw_only=True):
@@ -21,4 +21,4 @@ def main(argv: Sequence[str]) -> int:
     with open_router(options) as session:
         print(f"router {session.zid()} is up", file=sys.stderr, flush=True)
         ended_by = signal.sigwait(ends)
-    return INTERRUPTED if ended_by == signal.SIGINT else 0
+    return EXIT_INTERRUPTED if ended_by == signal.SIGINT else 0

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from phototaxis.bus import Bus
-from phototaxis.messages import Status
+from phototaxis.runtime.bus import Bus
+from phototaxis.wire.messages import Status
 
 from phototaxis_launcher.progress import Progress
 

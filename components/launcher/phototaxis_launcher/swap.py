@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Annotated
 
 from msgspec import Meta
-from phototaxis.bus import Bus
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.messages import Control, Launch, LaunchReply, Status
-from phototaxis.options import Parser, add_options, convert
-from phototaxis.session import BusOptions, open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.options import Parser, add_options, convert
+from phototaxis.runtime.session import BusOptions, open_session
+from phototaxis.wire.messages import Control, LaunchReply, LaunchRequest, Status
 
 from phototaxis_launcher.options import for_ours
 
@@ -22,7 +22,7 @@ class Options(BusOptions, kw_only=True):
 
     learner: str
     """name of the learner that takes over"""
-    within: Annotated[float, Meta(gt=0, le=3600)] = 60.0
+    timeout: Annotated[float, Meta(gt=0, le=3600)] = 60.0
     """seconds within which it must drive"""
     json: bool = False
     """print the answer as one JSON object"""
@@ -37,7 +37,7 @@ def main(argv: Sequence[str]) -> int:
     add_options(parser, Options, positional=["learner"])
     own, words = parser.parse_known_args(argv)
     options = convert(Options, vars(own))
-    reply = _ask(options, Launch(words=["--learner", options.learner, *for_ours(words)]))
+    reply = _ask(options, LaunchRequest(words=["--learner", options.learner, *for_ours(words)]))
     if reply.reason:
         raise UserError(reply.reason)
     if options.json:
@@ -47,7 +47,7 @@ def main(argv: Sequence[str]) -> int:
     return 0
 
 
-def _ask(options: Options, request: Launch) -> LaunchReply:
+def _ask(options: Options, request: LaunchRequest) -> LaunchReply:
     with open_session("observer", options) as session, Bus(session, options.name, "observer", "swap") as bus:
         if not bus.wait_for("launcher", LINKED_WITHIN_S):
             raise Unavailable(
@@ -57,10 +57,10 @@ def _ask(options: Options, request: Launch) -> LaunchReply:
         now = bus.control(Control(verb="status"))
         if now is not None and (delay := what_delays(now.status)):
             print(delay, file=sys.stderr)
-        reply = bus.ask_one("launch", request, timeout=options.within)
+        reply = bus.ask_one("launch", request, timeout=options.timeout)
     if reply is None:
         raise Unavailable(
-            f"the new agent did not take the seat within {options.within:g} s; see its log in the run's folder"
+            f"the new agent did not take the seat within {options.timeout:g} s; see its log in the run's folder"
         )
     return reply
 

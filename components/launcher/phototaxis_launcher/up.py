@@ -8,17 +8,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from phototaxis.bus import Bus
-from phototaxis.errors import ComponentFailed
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import Control, Status
-from phototaxis.ports import find_ports, viewer_url
-from phototaxis.session import open_session
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.errors import ComponentFailed
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.runtime.ports import find_ports, viewer_url
+from phototaxis.runtime.session import open_session
+from phototaxis.wire.messages import Control, Status
 
 from phototaxis_launcher.folder import RunFolder
 from phototaxis_launcher.news import News
 from phototaxis_launcher.options import UpOptions, parse
-from phototaxis_launcher.places import program
+from phototaxis_launcher.paths import program
 from phototaxis_launcher.processes import Processes
 from phototaxis_launcher.progress import Progress
 from phototaxis_launcher.requests import SwapRequests

@@ -1,7 +1,7 @@
 """Watches the processes of a run: restarts those that die, and goes on without those that a run can do without."""
 
-from phototaxis.errors import UserError, warn
-from phototaxis.messages import Status
+from phototaxis.runtime.errors import UserError, warn
+from phototaxis.wire.messages import Status
 
 from phototaxis_launcher.folder import RunFolder
 from phototaxis_launcher.processes import Processes

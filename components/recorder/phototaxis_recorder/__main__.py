@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
-from phototaxis import doors
-from phototaxis.component import ComponentOptions, entry, run
-from phototaxis.disk import try_file, try_folder
-from phototaxis.errors import UserError
-from phototaxis.messages import World
-from phototaxis.options import parse
-from phototaxis.ports import find_ports, viewer_url
+from phototaxis.guard import exposure
+from phototaxis.runtime.component import ComponentOptions, entry, run
+from phototaxis.runtime.disk import check_folder_writable, check_writable
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.ports import find_ports, viewer_url
+from phototaxis.wire.messages import World
 
 from phototaxis_recorder.page import ViewerPage
 from phototaxis_recorder.viewer import silence_rerun
@@ -38,27 +38,27 @@ class Options(ComponentOptions, kw_only=True):
 
 def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis recorder", "Record the run on the bus, live and on disk.")
-    if not options.insecure and not doors.is_loopback(options.bind):
+    if not options.insecure and not exposure.is_loopback(options.bind):
         raise UserError(
             f"--bind {options.bind}: others could watch, and nothing guards that; use 127.0.0.1, or add --insecure"
         )
     silence_rerun()
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")  # its files get their footer later
     from phototaxis_recorder.server import serve
-    from phototaxis_recorder.sinks import Recording
+    from phototaxis_recorder.sinks import RecordingSinks
 
     output = Path(options.output)
     if output.is_dir():
-        try_folder(output, "--output")
+        check_folder_writable(output, "--output")
     else:
-        try_file(output, "--output")
+        check_writable(output, "--output")
     wanted = {"--grpc-port": options.grpc_port, "--web-port": options.web_port}
     grpc_port, web_port = find_ports(options.bind, wanted)
 
-    def start(world: World) -> Recording:
+    def start(world: World) -> RecordingSinks:
         file = output / f"{world.run}.rrd" if output.is_dir() else output
         print(f"recorder: records the run {world.run} into {file}", file=sys.stderr, flush=True)
-        return Recording(world, file, options.bind, grpc_port, options.memory)
+        return RecordingSinks(world, file, options.bind, grpc_port, options.memory)
 
     page = ViewerPage(options.bind, web_port, grpc_port) if web_port >= 0 else None
     if page is not None:

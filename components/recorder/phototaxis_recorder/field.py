@@ -1,13 +1,13 @@
 """How light it is where: the arena's light on a grid, with the shadows of walls and obstacles, for the eye."""
 
 import numpy as np
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 
-CELLS = 120
+CELLS_A_SIDE = 120
 """Cells along the longer side of the room."""
-CORNERS = 24
+DISC_CORNERS = 24
 """Of the polygon that stands for a disc."""
-MOST = 20_000_000
+MAX_CELLS_TIMES_EDGES = 20_000_000
 """Cells × edges beyond which shadows are left out: they would take longer than a second."""
 
 
@@ -17,7 +17,7 @@ def light_field(arena: Arena) -> np.ndarray:
     As a light sensor without noise and body would read it (inverse square or linear law).
     """
     width, height = arena.size
-    cell = max(width, height) / CELLS
+    cell = max(width, height) / CELLS_A_SIDE
     columns, rows = max(round(width / cell), 1), max(round(height / cell), 1)
     x, y = (np.arange(columns) + 0.5) * width / columns, (np.arange(rows) + 0.5) * height / rows
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
@@ -30,7 +30,7 @@ def light_field(arena: Arena) -> np.ndarray:
             share = np.maximum(1 - distance / arena.sensing.light_range, 0)
         else:
             share = 1 / np.maximum(distance, 1) ** 2
-        if len(edges) * len(places) <= MOST:
+        if len(edges) * len(places) <= MAX_CELLS_TIMES_EDGES:
             share *= _sees(source, places, edges)
         total += light.brightness * share
     return np.minimum(total, 1).reshape(rows, columns)
@@ -41,7 +41,7 @@ def _edges(arena: Arena) -> np.ndarray:
     found = [(wall.start, wall.end) for wall in arena.walls]
     for polygon in arena.polygons:
         found += zip(polygon.corners, [*polygon.corners[1:], polygon.corners[0]], strict=True)
-    angle = np.arange(CORNERS) * 2 * np.pi / CORNERS
+    angle = np.arange(DISC_CORNERS) * 2 * np.pi / DISC_CORNERS
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     for disc in arena.discs:
         corners = (np.array(disc.centre) + disc.radius * ring).tolist()

@@ -15,9 +15,9 @@ from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
-from phototaxis.disk import write_all
+from phototaxis.runtime.disk import write_all
 
-CHUNK = 1 << 20
+CHUNK_BYTES = 1 << 20
 PAUSE_S = 0.001
 
 
@@ -89,7 +89,7 @@ class RecordingFile:
         while True:
             select.select([self._read], [], [])
             with self._lock:
-                data = os.read(self._read, CHUNK)
+                data = os.read(self._read, CHUNK_BYTES)
                 if not data:
                     return
                 if self.error is None:

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from enum import StrEnum
 from itertools import count
 
-from phototaxis.machine import Answer, Ask, Effect, Event, Own, Stop
-from phototaxis.messages import World
-from phototaxis.roles import ROLES
-from phototaxis.topics import TOPICS
-from phototaxis.transitions import Transitions
+from phototaxis.runtime.machine import Answer, Ask, Effect, Event, Own, Stop
+from phototaxis.runtime.roles import ROLES
+from phototaxis.runtime.transitions import Transitions
+from phototaxis.wire.messages import World
+from phototaxis.wire.topics import TOPICS
 
 from phototaxis_recorder.reader import LogReader
 

@@ -9,17 +9,17 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from phototaxis.disk import write_whole
-from phototaxis.errors import ComponentFailed
-from phototaxis.ports import free_ports
+from phototaxis.runtime.disk import write_atomic
+from phototaxis.runtime.errors import ComponentFailed
+from phototaxis.runtime.ports import free_ports
 from PIL import Image
 from rerun.experimental import ViewerClient
 
 from phototaxis_recorder.viewer import STARTS_WITHIN_S, rerun_program
 
-SIZE = "1500x900"
-FRAMES_A_SECOND = 4
-ANIMATION_WIDTH = 900
+SIZE_PIXELS = "1500x900"
+FRAMES_PER_SECOND = 4
+ANIMATION_WIDTH_PIXELS = 900
 
 
 @contextmanager
@@ -33,7 +33,7 @@ def viewer(source: str) -> Iterator[Any]:
     """
     port = str(*free_ports(1))
     what = ["--connect", source] if source.startswith("rerun+") else [source]
-    words = ["--headless", "--bind", "127.0.0.1", "--port", port, "--window-size", SIZE, *what]
+    words = ["--headless", "--bind", "127.0.0.1", "--port", port, "--window-size", SIZE_PIXELS, *what]
     with tempfile.TemporaryFile() as said:
         process = subprocess.Popen([rerun_program(), *words], stdout=said, stderr=said)
         try:
@@ -76,18 +76,18 @@ def picture(source: str, target: Path, seconds: float) -> None:
         if target.suffix == ".png":
             file = Path(folder) / "picture.png"
             client.save_screenshot(str(file))
-            write_whole(target, file.read_bytes())
+            write_atomic(target, file.read_bytes())
             return
         frames = []
-        for number in range(round(seconds * FRAMES_A_SECOND)):
+        for number in range(round(seconds * FRAMES_PER_SECOND)):
             file = Path(folder) / f"{number}.png"
             began = time.monotonic()
             client.save_screenshot(str(file))
             with Image.open(file) as image:
-                height = round(image.height * ANIMATION_WIDTH / image.width)
-                frames.append(image.convert("RGB").resize((ANIMATION_WIDTH, height)).quantize(96))
-            time.sleep(max(began + 1 / FRAMES_A_SECOND - time.monotonic(), 0))  # until the next frame
+                height = round(image.height * ANIMATION_WIDTH_PIXELS / image.width)
+                frames.append(image.convert("RGB").resize((ANIMATION_WIDTH_PIXELS, height)).quantize(96))
+            time.sleep(max(began + 1 / FRAMES_PER_SECOND - time.monotonic(), 0))  # until the next frame
         film = BytesIO()
-        duration = 1000 // FRAMES_A_SECOND
+        duration = 1000 // FRAMES_PER_SECOND
         frames[0].save(film, "GIF", save_all=True, append_images=frames[1:], duration=duration, loop=0)
-        write_whole(target, film.getvalue())
+        write_atomic(target, film.getvalue())

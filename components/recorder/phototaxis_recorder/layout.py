@@ -2,19 +2,19 @@
 
 import rerun as rr
 import rerun.blueprint as rrb
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 
 from phototaxis_recorder.colors import BLUE, INK, ORANGE, RED, STONE, YELLOW, of_light
 from phototaxis_recorder.field import light_field
-from phototaxis_recorder.policy import HEIGHT, WIDTH, frame
+from phototaxis_recorder.policy_map import HEIGHT, WIDTH, frame
 
-TRAIL = 300
+TRAIL_TICKS = 300
 """Ticks of trail that are shown behind the robot."""
-PLOTS = 600
+PLOT_TICKS = 600
 """Ticks that the fast plots look back."""
-PAPER = 0.8
+PAPER_SUCCESS_RATE = 0.8
 """What the paper reports for its Q-table with the simple percept: "upwards of 80%"."""
-MEAN = 100
+MEAN_TICKS = 100
 """Ticks over which the mean reward is taken."""
 
 
@@ -37,7 +37,7 @@ def blueprint(arena: Arena, epochs: int) -> rrb.Blueprint:
         name=f"Arena: {arena.name}",
         background=[246, 246, 243],
         visual_bounds=rrb.VisualBounds2D(x_range=[-edge, width + edge], y_range=[-height - edge, edge]),
-        overrides={"/world/trail": back(TRAIL)},
+        overrides={"/world/trail": back(TRAIL_TICKS)},
     )
     success = rrb.TimeSeriesView(
         origin="/plots/success",
@@ -48,8 +48,8 @@ def blueprint(arena: Arena, epochs: int) -> rrb.Blueprint:
     reward = rrb.TimeSeriesView(
         origin="/plots",
         contents=["/plots/reward", "/plots/mean_reward"],
-        name=f"Reward, and its mean over {MEAN} ticks",
-        time_ranges=back(PLOTS),
+        name=f"Reward, and its mean over {MEAN_TICKS} ticks",
+        time_ranges=back(PLOT_TICKS),
     )
     return rrb.Blueprint(
         rrb.Horizontal(
@@ -57,7 +57,7 @@ def blueprint(arena: Arena, epochs: int) -> rrb.Blueprint:
             rrb.Vertical(
                 success,
                 reward,
-                rrb.TimeSeriesView(origin="/plots/light", name="Light, left and right", time_ranges=back(PLOTS)),
+                rrb.TimeSeriesView(origin="/plots/light", name="Light, left and right", time_ranges=back(PLOT_TICKS)),
                 rrb.TimeSeriesView(origin="/plots/temperature", name="Temperature", axis_x=whole),
                 row_shares=[3, 3, 2, 2],
             ),

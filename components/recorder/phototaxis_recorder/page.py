@@ -9,14 +9,14 @@ from http.server import BaseHTTPRequestHandler
 from threading import Lock, Thread
 from typing import cast
 
-from phototaxis.errors import ComponentFailed
-from phototaxis.ports import free_ports
+from phototaxis.runtime.errors import ComponentFailed
+from phototaxis.runtime.ports import free_ports
 
 from phototaxis_recorder.viewer import STARTS_WITHIN_S, rerun_program
 
-FILES = ("/", "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/apple-touch-icon.png")
+VIEWER_PATHS = ("/", "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/apple-touch-icon.png")
 """Everything that the web viewer is made of."""
-ELSEWHERE = re.compile(rb"""<link[^>]*href="https://[^>]*>""")
+EXTERNAL_LINK = re.compile(rb"""<link[^>]*href="https://[^>]*>""")
 """Hints in the page to connect to others, which a content security policy does not cover."""
 
 
@@ -103,9 +103,9 @@ def _viewer_files() -> dict[str, tuple[str, bytes]]:
         start_new_session=True,
     )
     try:
-        files = {path: _fetch(page, path) for path in FILES}
+        files = {path: _fetch(page, path) for path in VIEWER_PATHS}
         kind, html = files["/"]
-        files["/"] = kind, ELSEWHERE.sub(b"", html)
+        files["/"] = kind, EXTERNAL_LINK.sub(b"", html)
         return files
     finally:
         process.communicate()

@@ -8,8 +8,8 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from phototaxis.machine import Ask, Effect, Own
-from phototaxis.messages import LogRequest
+from phototaxis.runtime.machine import Ask, Effect, Own
+from phototaxis.wire.messages import LogRequest
 
 
 class Write(Own):

@@ -9,12 +9,12 @@ from typing import Annotated
 
 import msgspec
 from msgspec import Meta
-from phototaxis.errors import UserError
-from phototaxis.options import parse
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.options import parse
 
 from phototaxis_recorder.summary import RecordingFile, recordings, summary_file
 
-DAY_S, MEGABYTE = 86_400, 1_000_000
+DAY_S, MEGABYTE_BYTES = 86_400, 1_000_000
 BUSY_S = 60.0
 """A recording written to within this many seconds is not removed."""
 
@@ -69,7 +69,7 @@ def excess(
     for recording in found:
         total += recording.size
         old = max_age is not None and now - recording.written > max_age * DAY_S
-        much = max_size is not None and total > max_size * MEGABYTE
+        much = max_size is not None and total > max_size * MEGABYTE_BYTES
         if (old or much) and now - recording.written > BUSY_S:
             doomed.append(recording)
     return doomed
@@ -93,6 +93,6 @@ def table(found: list[RecordingFile]) -> list[str]:
             success = newest if summary.episodes else "no episode has ended"
             arena = summary.arena if names[summary.arena] == 1 else f"{summary.arena} ({summary.arena_digest[:4]})"
             known = (summary.run, arena, ", ".join(summary.drivers), str(summary.epochs), success)
-        rows.append((str(file), *known, f"{size / MEGABYTE:.1f}"))
+        rows.append((str(file), *known, f"{size / MEGABYTE_BYTES:.1f}"))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -2,18 +2,18 @@
 
 from collections.abc import Callable
 
-from phototaxis.bus import Bus
-from phototaxis.errors import Unavailable
-from phototaxis.machine import Own
-from phototaxis.messages import Recorded, World
-from phototaxis.runner import Runner
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.errors import Unavailable
+from phototaxis.runtime.machine import Own
+from phototaxis.runtime.runner import Runner
+from phototaxis.wire.messages import RecordingProgress, World
 
 from phototaxis_recorder.gathering import Close, Gathering, Keep, Note, Open, Report
 from phototaxis_recorder.reader import Write
-from phototaxis_recorder.sinks import Recording
+from phototaxis_recorder.sinks import RecordingSinks
 
 
-def serve(bus: Bus, start: Callable[[World], Recording]) -> None:
+def serve(bus: Bus, start: Callable[[World], RecordingSinks]) -> None:
     """Record whatever run is on the bus until a "stop" event; then take what is still to be had.
 
     Parameters
@@ -42,10 +42,10 @@ class Desk:
     faults : why recordings that are closed are not complete, a line for each.
     """
 
-    def __init__(self, bus: Bus, start: Callable[[World], Recording]):
+    def __init__(self, bus: Bus, start: Callable[[World], RecordingSinks]):
         self._bus, self._start = bus, start
         self._run = ""
-        self._recording: Recording | None = None
+        self._recording: RecordingSinks | None = None
         self.faults: list[str] = []
 
     def carry(self, effect: Own) -> None:
@@ -57,7 +57,7 @@ class Desk:
         elif self._recording is not None:
             self._add(self._recording, effect)
 
-    def _add(self, recording: Recording, effect: Own) -> None:
+    def _add(self, recording: RecordingSinks, effect: Own) -> None:
         match effect:
             case Write():
                 recording.translator.add(effect.chunk)
@@ -68,7 +68,8 @@ class Desk:
                 recording.keep()
             case Report():
                 self._bus.put(
-                    "recording", Recorded(run=self._run, tick=recording.kept, warning=recording.fault or recording.low)
+                    "recording",
+                    RecordingProgress(run=self._run, tick=recording.kept, warning=recording.fault or recording.low),
                 )
 
     def close(self) -> None:

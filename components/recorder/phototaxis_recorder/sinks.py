@@ -6,9 +6,9 @@ import subprocess
 from pathlib import Path
 
 import rerun as rr
-from phototaxis.disk import unwritten
-from phototaxis.errors import Unavailable, warn
-from phototaxis.messages import World
+from phototaxis.runtime.disk import write_failure
+from phototaxis.runtime.errors import Unavailable, warn
+from phototaxis.wire.messages import World
 
 from phototaxis_recorder.file import RecordingFile
 from phototaxis_recorder.layout import blueprint
@@ -16,13 +16,13 @@ from phototaxis_recorder.summary import write_summary
 from phototaxis_recorder.translate import Translator
 from phototaxis_recorder.viewer import rerun_program
 
-LARGE = 250_000_000
+MAX_REWRITTEN_BYTES = 250_000_000
 """Bytes above which a recording is not rewritten at its end: that takes more than twice as much memory."""
-LOW = 200_000_000
+MIN_FREE_BYTES = 200_000_000
 """Bytes that are left on a disk below which a recording warns."""
 
 
-class Recording:
+class RecordingSinks:
     """The recording of one run: a live server, and a file whose summary says how far it goes.
 
     At the first failure the file is cut back to what the last summary tells, and is written no more; the live
@@ -68,7 +68,7 @@ class Recording:
             self._stopped = True
             self._out.cut(self._size)
             told = f"recorded up to tick {self.kept}" if self.kept >= 0 else "nothing is recorded"
-            self._fail(f"{unwritten(self.file, error) if isinstance(error, OSError) else error}; {told}")
+            self._fail(f"{write_failure(self.file, error) if isinstance(error, OSError) else error}; {told}")
         except Unavailable as error:  # the recording itself is well
             self._fail(str(error))
         else:
@@ -87,13 +87,13 @@ class Recording:
         try:
             return RecordingFile(self.file)
         except OSError as error:
-            self.fault = f"{unwritten(self.file, error)}; nothing is recorded"
+            self.fault = f"{write_failure(self.file, error)}; nothing is recorded"
             return None
 
     def _mind_the_space(self) -> None:
         free = shutil.disk_usage(self.file.parent).free
-        if free < LOW and not self.low:
-            self.low = f"{self.file}: less than {LOW / 1e6:.0f} MB are left on its disk"
+        if free < MIN_FREE_BYTES and not self.low:
+            self.low = f"{self.file}: less than {MIN_FREE_BYTES / 1e6:.0f} MB are left on its disk"
             self._tell(self.low)
 
     def _fail(self, fault: str) -> None:
@@ -115,7 +115,7 @@ def complete(file: Path) -> None:
         size, free = file.stat().st_size, shutil.disk_usage(file.parent).free
     except FileNotFoundError:
         return
-    if size > min(LARGE, free):
+    if size > min(MAX_REWRITTEN_BYTES, free):
         return
     part = file.with_suffix(".part")
     command = [rerun_program(), "rrd", "optimize", file, "-o", part]

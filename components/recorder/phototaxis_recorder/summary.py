@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
-from phototaxis.disk import write_whole
+from phototaxis.runtime.disk import write_atomic
 
 
 class Summary(msgspec.Struct):
@@ -46,7 +46,7 @@ def summary_file(file: Path) -> Path:
 
 def write_summary(file: Path, summary: Summary) -> None:
     """Put the summary beside its recording, whole or not at all; `Unavailable` when it cannot be written."""
-    write_whole(summary_file(file), msgspec.json.encode(summary))
+    write_atomic(summary_file(file), msgspec.json.encode(summary))
 
 
 def recordings(folder: Path) -> list[RecordingFile]:

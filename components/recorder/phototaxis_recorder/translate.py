@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from phototaxis.messages import AgentLog, EndedEpisode, SensorsLog, SimLog, World
 from phototaxis.task import ACTIONS, PERCEPTS
+from phototaxis.wire.messages import AgentLog, EndedEpisode, SensorsLog, SimLog, World
 
-from phototaxis_recorder import policy
+from phototaxis_recorder import policy_map
 from phototaxis_recorder.colors import BLUE, of_distance, of_reward
 from phototaxis_recorder.gathering import BEHIND_TICKS
-from phototaxis_recorder.layout import MEAN, PAPER, draw_world
+from phototaxis_recorder.layout import MEAN_TICKS, PAPER_SUCCESS_RATE, draw_world
 from phototaxis_recorder.summary import Summary
 
-PATIENCE = 4000
+MAX_WAITING_ROWS = 4000
 """Rows of one role that may wait for another's."""
-WORDS = {"terminated": "reached the light", "truncated": "gave up", "reset": "was reset"}
+END_PHRASES = {"terminated": "reached the light", "truncated": "gave up", "reset": "was reset"}
 
 
 class Translator:
@@ -44,7 +44,7 @@ class Translator:
         self._models = {"sonar": "", "light": ""}
         self._robots, self._system = world.robots, ("", "")
         """How many robots there are; learner and percept that wrote last."""
-        self._rewards: deque[float] = deque(maxlen=MEAN)
+        self._rewards: deque[float] = deque(maxlen=MEAN_TICKS)
         self.summary = Summary(world.run, world.arena.name, world.arena.digest)
         draw_world(recording, world.arena)
 
@@ -103,7 +103,7 @@ class Translator:
         known = min(self._newest["sim"], self._newest["sensors"])
         if known - self._newest["agent"] <= BEHIND_TICKS:
             known = min(known, self._newest["agent"])
-        until = math.inf if last or waiting > PATIENCE else known
+        until = math.inf if last or waiting > MAX_WAITING_ROWS else known
         agent = self._take("agent", until)
         if rows := self._take("sim", until):
             tick, x, y, heading = rows
@@ -138,7 +138,7 @@ class Translator:
             steps = "step" if episode.steps == 1 else "steps"
             self._text(
                 episode.tick,
-                f"episode {episode.episode}: {episode.driver or 'nobody'} {WORDS.get(episode.end, episode.end)} "
+                f"episode {episode.episode}: {episode.driver or 'nobody'} {END_PHRASES.get(episode.end, episode.end)} "
                 f"after {episode.steps} {steps}",
             )
             self._at(episode.tick)
@@ -147,7 +147,7 @@ class Translator:
             self.summary.reached += self._recent[-1]
             rr.log("plots/success/rate", rr.Scalars(rate), recording=self._recording)
             if self._is_the_papers:
-                rr.log("plots/success/paper", rr.Scalars(PAPER), recording=self._recording)
+                rr.log("plots/success/paper", rr.Scalars(PAPER_SUCCESS_RATE), recording=self._recording)
         self._episodes.clear()
         self.summary.epochs = max(self.summary.tick - self.summary.episodes, 0)
 
@@ -203,10 +203,10 @@ class Translator:
             table = np.reshape(chunk.values, (states, len(ACTIONS))).astype(np.float32)
             rr.log("learner/table", rr.Tensor(table, dim_names=["state", "action"]), recording=log)
             rr.log("learner/visits", rr.BarChart(visits, color=BLUE), recording=log)
-            moving, still = policy.arrows(percept, table, visits)
+            moving, still = policy_map.arrows(percept, table, visits)
             rr.log("learner/policy/best", moving, recording=log)
             rr.log("learner/policy/still", still, recording=log)
-            rr.log("learner/policy/here", policy.present(percept, chunk.state[-1]), recording=log)
+            rr.log("learner/policy/here", policy_map.present(percept, chunk.state[-1]), recording=log)
 
     def _text(self, tick: int, text: str, level: rr.TextLogLevel = rr.TextLogLevel.INFO) -> None:
         self._at(tick)

@@ -12,10 +12,10 @@ from typing import Annotated
 
 import msgspec
 from msgspec import Meta
-from phototaxis.disk import try_file
-from phototaxis.errors import ComponentFailed, Unavailable, UserError
-from phototaxis.options import parse
-from phototaxis.ports import find_ports, viewer_url
+from phototaxis.runtime.disk import check_writable
+from phototaxis.runtime.errors import ComponentFailed, Unavailable, UserError
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.ports import find_ports, viewer_url
 
 from phototaxis_recorder.page import ViewerPage
 from phototaxis_recorder.summary import recordings
@@ -49,7 +49,7 @@ def main(argv: Sequence[str]) -> int:
     if options.picture and Path(options.picture).suffix not in (".png", ".gif"):
         raise UserError(f"--picture {options.picture}: it must end in .png or .gif")
     if options.picture:
-        try_file(Path(options.picture), "--picture")
+        check_writable(Path(options.picture), "--picture")
     web = options.web or not has_display()
     silence_rerun()
     if options.run:

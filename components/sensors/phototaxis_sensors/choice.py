@@ -5,14 +5,14 @@ from contextlib import closing, contextmanager
 from importlib.metadata import entry_points
 from typing import Any, Protocol
 
-from phototaxis.arena import Arena
-from phototaxis.errors import UserError
-from phototaxis.fmu import FmuOptions
-from phototaxis.messages import World
-from phototaxis.words import known
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.fmu import FmuOptions
+from phototaxis.runtime.phrases import known
+from phototaxis.wire.messages import World
 
-from phototaxis_sensors.crowd import CrowdSuite
-from phototaxis_sensors.many import SuiteOfMany
+from phototaxis_sensors.batch_sensors import BatchSensors
+from phototaxis_sensors.batch_suite import BatchSuite
 from phototaxis_sensors.scene import Scene
 from phototaxis_sensors.suite import Models, SensorSuite, Suite, built_in
 
@@ -20,32 +20,32 @@ GROUP = "phototaxis.sensors"
 """Entry points of packages that provide sensor models."""
 
 
-class Choice(Protocol):
+class SensorFactory(Protocol):
     """Makes the sensors of one robot, or of many."""
 
-    remembers: bool
+    stateful: bool
     """Whether many robots must all be in the same tick of their episodes."""
 
     def __call__(self, arena: Arena, scene: Scene) -> Models: ...
-    def crowd(self, world: World, count: int) -> CrowdSuite:
+    def batch(self, world: World, count: int) -> BatchSuite:
         """The sensors of `count` robots."""
         ...
 
 
-class BuiltInChoice:
+class BuiltInFactory:
     """The built-in models."""
 
-    remembers = False
+    stateful = False
 
     def __call__(self, arena: Arena, scene: Scene) -> Models:
         return built_in(arena, scene)
 
-    def crowd(self, world: World, count: int) -> CrowdSuite:
+    def batch(self, world: World, count: int) -> BatchSuite:
         """The sensors of any number of robots."""
-        return CrowdSuite(world)
+        return BatchSuite(world)
 
 
-class Provided(Choice, Protocol):
+class Provided(SensorFactory, Protocol):
     """The sensors of a provider, which hold processes or other things of the machine until they are closed."""
 
     def try_out(self) -> None:
@@ -55,7 +55,7 @@ class Provided(Choice, Protocol):
     def close(self) -> None: ...
 
 
-def make_suite(choice: Choice, world: World) -> Suite[Any, Any]:
+def make_suite(choice: SensorFactory, world: World) -> Suite[Any, Any]:
     """The suite of a world.
 
     Raises
@@ -65,13 +65,13 @@ def make_suite(choice: Choice, world: World) -> Suite[Any, Any]:
     """
     if world.robots == 1:
         return SensorSuite(world, choice)
-    if choice.remembers:
+    if choice.stateful:
         raise UserError(f"an FMU senses for one robot; this world has {world.robots}: start it without --robots")
-    return SuiteOfMany(choice.crowd(world, world.robots), world.robots)
+    return BatchSensors(choice.batch(world, world.robots), world.robots)
 
 
 @contextmanager
-def choose(options: FmuOptions, one_cpu: bool = False) -> Iterator[Choice]:
+def choose_sensors(options: FmuOptions, one_cpu: bool = False) -> Iterator[SensorFactory]:
     """The built-in models, or FMUs, each of which is loaded once to see that it works.
 
     With `one_cpu` the thread that uses FMUs stays on one CPU with them, which makes them three times as fast.
@@ -82,7 +82,7 @@ def choose(options: FmuOptions, one_cpu: bool = False) -> Iterator[Choice]:
         when an FMU cannot be used, an option does not fit it, or what runs FMUs is not installed.
     """
     if options == FmuOptions():
-        yield BuiltInChoice()
+        yield BuiltInFactory()
         return
     with closing(provider("fmu")(options, one_cpu)) as models:
         models.try_out()

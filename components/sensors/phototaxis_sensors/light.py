@@ -3,8 +3,8 @@
 import math
 from typing import NamedTuple
 
-from phototaxis.arena import Arena, Light
-from phototaxis.sight import SHORT
+from phototaxis.geometry.arena import Arena, Light
+from phototaxis.geometry.sight import LAMP_CLEARANCE_M
 
 from phototaxis_sensors.model import BuiltIn, Moment
 from phototaxis_sensors.scene import Scene
@@ -51,9 +51,9 @@ class Sights:
         sx, sy = sensor
         visible = not (self._body_shadow and self._through_body(lx, ly, sx, sy))
         distance = math.hypot(lx - sx, ly - sy)
-        if visible and distance > SHORT:
+        if visible and distance > LAMP_CLEARANCE_M:
             eye = x + cos * sx - sin * sy, y + sin * sx + cos * sy
-            share = 1 - SHORT / distance
+            share = 1 - LAMP_CLEARANCE_M / distance
             lamp = (
                 eye[0] + share * (light.position[0] - eye[0]),
                 eye[1] + share * (light.position[1] - eye[1]),

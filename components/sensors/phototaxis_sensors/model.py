@@ -19,7 +19,7 @@ class Moment(Protocol):
     def heading(self) -> float: ...
 
 
-class Past(NamedTuple):
+class PastMoment(NamedTuple):
     """A moment that is over."""
 
     tick: int
@@ -33,7 +33,7 @@ class BuiltIn:
     """What the built-in models have in common: they are pure functions of the pose."""
 
     name = "built-in"
-    remembers = False
+    stateful = False
 
     def begun_anew(self, tick: int) -> None:
         """Nothing is lost."""
@@ -48,7 +48,7 @@ class SensorModel(Protocol):
         ...
 
     @property
-    def remembers(self) -> bool:
+    def stateful(self) -> bool:
         """Whether earlier ticks of the episode matter; then each tick is to be asked once, in order."""
         ...
 

@@ -1,7 +1,7 @@
 """What a ray can hit: the arena's static shapes in pymunk's spatial index."""
 
 import pymunk
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 from phototaxis_world.shapes import static_shapes
 
 _ALL = pymunk.ShapeFilter()

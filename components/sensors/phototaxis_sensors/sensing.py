@@ -6,14 +6,14 @@ from enum import StrEnum
 from typing import Any, NamedTuple
 
 import msgspec
-from phototaxis.codec import Refused
-from phototaxis.machine import Answer, Ask, Effect, Event, Publish, Record, Refuse, Say, Stop
-from phototaxis.messages import LogRequest, SimLog, World
-from phototaxis.protocol import Once
-from phototaxis.topics import step_topics
-from phototaxis.transitions import Transitions
+from phototaxis.runtime.machine import Answer, Ask, Effect, Event, Publish, Record, Refuse, Say, Stop
+from phototaxis.runtime.protocol import AnswerCache
+from phototaxis.runtime.transitions import Transitions
+from phototaxis.wire.codec import Refused
+from phototaxis.wire.messages import LogRequest, SimLog, World
+from phototaxis.wire.topics import step_topics
 
-from phototaxis_sensors.model import Past
+from phototaxis_sensors.model import PastMoment
 from phototaxis_sensors.suite import Suite
 
 
@@ -68,7 +68,7 @@ class Session:
     def __init__(self, world: World, suite: Suite[Any, Any]):
         self.suite, self.topics = suite, step_topics(world.robots)
         self.place = Place(self.topics.state, world.run)
-        self.sense = Once[Any](suite)
+        self.sense = AnswerCache[Any](suite)
         self.newest = -1
         """The newest tick that was answered."""
 
@@ -134,18 +134,18 @@ class Sensing:
             return []
         session = self._session = Session(world, self._make(world))
         said = Say(f"senses in the run {world.run}; robots: {world.robots}")
-        if self._phase.take(Input.WORLD_FOR_MEMORY if session.suite.remembers else Input.WORLD) is Phase.RECALLING:
+        if self._phase.take(Input.WORLD_FOR_MEMORY if session.suite.stateful else Input.WORLD) is Phase.RECALLING:
             return [said, Ask("log/sim", "log/sim", LogRequest(), every=True)]
         return [said, *self._sense(session, self._newest_waiting())]
 
     def _recall(self, session: Session, chunks: Sequence[SimLog]) -> list[Effect]:
         """Lead the models through the earlier ticks of the episode, and answer the newest state that waits."""
         suite, state = session.suite, self._newest_waiting()
-        past = {tick: Past(tick, one.episode, one.x, one.y, one.heading) for tick, one in self._waiting.items()}
+        past = {tick: PastMoment(tick, one.episode, one.x, one.y, one.heading) for tick, one in self._waiting.items()}
         for chunk in chunks:
             if chunk.run == self._wanted.run:
                 columns = zip(chunk.tick, chunk.episode, chunk.x, chunk.y, chunk.heading, strict=True)
-                past.update({row[0]: Past(*row) for row in columns})
+                past.update({row[0]: PastMoment(*row) for row in columns})
         episode = [past[tick] for tick in sorted(past) if tick < state.tick and past[tick].episode == state.episode]
         for moment in episode:
             suite.follow(moment)

@@ -4,18 +4,18 @@ from functools import partial
 from itertools import chain
 from typing import Any
 
-from phototaxis.bus import Bus
-from phototaxis.chunks import Chunks
-from phototaxis.messages import SensorsLog
-from phototaxis.runner import Runner
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.chunks import LogPublisher
+from phototaxis.runtime.runner import Runner
+from phototaxis.wire.messages import SensorsLog
 
-from phototaxis_sensors.choice import Choice, make_suite
+from phototaxis_sensors.choice import SensorFactory, make_suite
 from phototaxis_sensors.sensing import Sensing
 
 
-def serve(bus: Bus, choice: Choice) -> None:
+def serve(bus: Bus, choice: SensorFactory) -> None:
     """Answer every state with its readings, from the models of `choice`, until a "stop" event."""
-    log = Chunks(bus, "log/sensors", partial(chunk, bus.ident))
+    log = LogPublisher(bus, "log/sensors", partial(chunk, bus.ident))
     Runner(bus, Sensing(partial(make_suite, choice)), log=log).run()
 
 

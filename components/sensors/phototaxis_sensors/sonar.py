@@ -3,12 +3,12 @@
 import math
 
 import numpy as np
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 
 from phototaxis_sensors.model import BuiltIn, Moment
 from phototaxis_sensors.scene import Scene
 
-BACK_OFF = 0.1
+RAY_SETBACK_M = 0.1
 """A ray starts this far inside the body, m, so that a rim pressed into a wall reads 0 and not what is behind it."""
 
 
@@ -18,11 +18,11 @@ class SonarModel(BuiltIn):
     def __init__(self, arena: Arena, scene: Scene):
         robot = arena.robot
         self._scene, self._range = scene, robot.sonar_range
-        self._reach = robot.sonar_range + BACK_OFF
+        self._reach = robot.sonar_range + RAY_SETBACK_M
         mounts = np.array([sonar.position for sonar in robot.sonars])
         angles = np.array([sonar.angle for sonar in robot.sonars])
         aim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        starts = mounts - BACK_OFF * aim
+        starts = mounts - RAY_SETBACK_M * aim
         self._points = np.concatenate([starts, starts + self._reach * aim])  # (32, 2): starts, then ends
 
     def __call__(self, moment: Moment) -> list[float]:
@@ -32,5 +32,5 @@ class SonarModel(BuiltIn):
         turned += (moment.x, moment.y)
         points = turned.tolist()
         hit, reach = self._scene.hit, self._reach
-        found = [reach * hit(start, end) - BACK_OFF for start, end in zip(points[:16], points[16:], strict=True)]
+        found = [reach * hit(start, end) - RAY_SETBACK_M for start, end in zip(points[:16], points[16:], strict=True)]
         return [distance if distance > 0 else 0.0 for distance in found]

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
-from phototaxis.arena import Arena
-from phototaxis.messages import Readings, State, World
+from phototaxis.geometry.arena import Arena
+from phototaxis.wire.messages import Readings, State, World
 
 from phototaxis_sensors.light import LightModel
 from phototaxis_sensors.model import Moment, SensorModel
@@ -20,7 +20,7 @@ class Suite(Protocol[StateT, ReadingsT]):
     """The sensors of a world, whether it has one robot or many."""
 
     @property
-    def remembers(self) -> bool:
+    def stateful(self) -> bool:
         """Earlier ticks of the episode matter; then each tick is asked once, in order."""
         ...
 
@@ -78,7 +78,7 @@ class SensorSuite:
         arena = world.arena
         self._seed, self._noise, self._range = world.seed, arena.sensing.noise, arena.robot.sonar_range
         self._models = make(arena, Scene(arena))
-        self.remembers = any(model.remembers for model in self._models)
+        self.stateful = any(model.stateful for model in self._models)
 
     @property
     def names(self) -> tuple[str, str]:

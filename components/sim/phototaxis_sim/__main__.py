@@ -5,14 +5,14 @@ from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
-from phototaxis.bus import Bus
-from phototaxis.component import ComponentOptions, entry, run
-from phototaxis.disk import try_file
-from phototaxis.errors import UserError
-from phototaxis.journal import Journal
-from phototaxis.messages import MAX_ROBOTS, Count, Seed, run_name
-from phototaxis.options import parse
-from phototaxis.words import WORD
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.component import ComponentOptions, entry, run
+from phototaxis.runtime.disk import check_writable
+from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.journal import Journal
+from phototaxis.runtime.options import parse
+from phototaxis.runtime.phrases import WORD
+from phototaxis.wire.messages import MAX_ROBOTS, Count, Seed, run_name
 
 
 class Options(ComponentOptions, kw_only=True):
@@ -28,7 +28,7 @@ class Options(ComponentOptions, kw_only=True):
     """simulated seconds per second; 0: lockstep, as fast as the answers come"""
     run: Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["run-1"])] = ""
     """name of the run (default: date, time and a few random letters)"""
-    patience: Annotated[float, Meta(gt=0)] = 5.0
+    driver_timeout: Annotated[float, Meta(gt=0)] = 5.0
     """seconds after which a driver that is there but silent loses the seat, if somebody else waits for it"""
     robots: Annotated[int, Meta(ge=1, le=MAX_ROBOTS)] = 1
     """so many robots at once, each alone in its arena, placed as with the seeds from `seed` on"""
@@ -39,23 +39,23 @@ class Options(ComponentOptions, kw_only=True):
 def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis sim", "Run the world: physics, time and the seat.")
     from phototaxis_sim import arenas
-    from phototaxis_sim.many import SimulationOfMany
+    from phototaxis_sim.batch_simulation import BatchSimulation
     from phototaxis_sim.pace import Pace
     from phototaxis_sim.server import serve as serve_simulation
     from phototaxis_sim.simulation import Simulation
 
-    arena = arenas.enter(options.arena)
+    arena = arenas.load_checked(options.arena)
     setting = arena, options.seed, options.run or run_name(), options.epochs
-    simulation = SimulationOfMany(*setting, options.robots) if options.robots > 1 else Simulation(*setting)
+    simulation = BatchSimulation(*setting, options.robots) if options.robots > 1 else Simulation(*setting)
     if options.robots > 1 and options.restarted:
         raise UserError("a simulation of many robots that died is not continued; start the run again")
     journal = Journal(Path(options.journal)) if options.journal and options.robots == 1 else None
     if journal is not None:
-        try_file(journal.path, "--journal")
+        check_writable(journal.path, "--journal")
 
     def serve(bus: Bus) -> None:
         pace = Pace(arena.motion.control_period, options.speed)
-        serve_simulation(bus, simulation, pace, journal, options.patience)
+        serve_simulation(bus, simulation, pace, journal, options.driver_timeout)
 
     run("sim", options, serve)
 

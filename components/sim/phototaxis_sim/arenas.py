@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from phototaxis.arena import Arena
-from phototaxis.errors import UserError, warn
-from phototaxis.words import known, plain
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.errors import UserError, warn
+from phototaxis.runtime.phrases import known, plain
 
-from phototaxis_sim.dim import too_dim
+from phototaxis_sim.brightness import too_dim
 from phototaxis_sim.survey import survey
 
 _FOLDER = resources.files("phototaxis_sim") / "arenas"
-_LIMIT = 16_000_000
+_MAX_BYTES = 16_000_000
 _surveyed: dict[str, list[str]] = {}
 """What `survey` said, by the arena's digest."""
 
@@ -38,8 +38,8 @@ def load(name: str) -> Arena:
     try:
         if not path.is_file():
             raise UserError(f"no arena '{name}': neither a file nor one that is shipped; {known(name, shipped())}")
-        if path.stat().st_size > _LIMIT:
-            raise UserError(f"{name}: larger than {_LIMIT} bytes, not an arena")
+        if path.stat().st_size > _MAX_BYTES:
+            raise UserError(f"{name}: larger than {_MAX_BYTES} bytes, not an arena")
         return parse(path.read_text("utf-8-sig"), name)
     except UnicodeDecodeError:
         raise UserError(f"{name}: not a text file in UTF-8") from None
@@ -47,7 +47,7 @@ def load(name: str) -> Arena:
         raise UserError(f"arena {name!r}: {getattr(error, 'strerror', None) or error}") from None
 
 
-def enter(name: str, goal: bool = True) -> Arena:
+def load_checked(name: str, goal: bool = True) -> Arena:
     """As `load`, for a command that is about to use the arena: what is suspicious about it is a warning on stderr.
 
     Without `goal`, as where episodes end by themselves, no light needs to be bright enough to be reached.

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
-from phototaxis.disk import unwritten
-from phototaxis.errors import Unavailable, UserError
-from phototaxis.journal import GIVEN_UP, Journal
+from phototaxis.runtime.disk import write_failure
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.journal import GIVEN_UP, Journal
 
 from phototaxis_sim.simulation import Simulation, Snapshot
 
@@ -46,7 +46,7 @@ def open_journal(journal: Journal, fresh: Simulation) -> Continued | None:
         else:
             journal.resume(frames)
     except OSError as error:
-        raise unwritten(journal.path, error) from None
+        raise write_failure(journal.path, error) from None
     return found
 
 

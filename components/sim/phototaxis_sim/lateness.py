@@ -3,7 +3,7 @@
 from collections import deque
 
 RECENT_TICKS = 100
-MANY = 10
+MIN_LATE_TICKS = 10
 """So many late ones among the recent ticks are worth a word."""
 
 
@@ -34,7 +34,7 @@ class Lateness:
         """Which part is too slow now, and how often, for people; "" while it does not matter."""
         counts = {agent: self._recent.count("agent"), sensors: self._recent.count("sensors")}
         late = sum(counts.values())
-        if late < MANY:
+        if late < MIN_LATE_TICKS:
             return ""
         slower = max(counts, key=counts.__getitem__)
         return f"{slower} is too slow: {late} of the last {len(self._recent)} ticks had no command in time"

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from phototaxis.machine import Record
-from phototaxis.messages import EndedEpisode, SimLog, State
+from phototaxis.runtime.machine import Record
+from phototaxis.wire.messages import EndedEpisode, SimLog, State
 
 
 def row(state: State, ended: tuple[EndedEpisode, ...], late: int) -> Record:

@@ -1,6 +1,6 @@
 """When the next tick may come: in lockstep with the answers, or by the clock."""
 
-STOP_AFTER = 2.0
+STOP_AFTER_PERIODS = 2.0
 """In real time the motors stop when the newest command is older than this many control periods."""
 
 
@@ -44,7 +44,7 @@ class Pace:
 
     def stale(self, now: float) -> bool:
         """Whether the newest command is too old to drive on."""
-        return now - self._commanded > STOP_AFTER * self._length()
+        return now - self._commanded > STOP_AFTER_PERIODS * self._length()
 
     def _length(self) -> float:
         return self._period / self.speed if self.speed else 0.0

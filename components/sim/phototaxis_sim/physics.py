@@ -2,8 +2,8 @@
 
 The robot is overdamped: in each physics step the solver starts from the velocity that the wheels ask
 for and takes away what the contacts forbid, so that the body is stopped by a wall and slides along it.
-A physics step that would take the body through something thin is divided into strides, and where the
-solver pushes it further than it may, between two walls for instance, the stride is not made.
+A physics step that would take the body through something thin is divided into substeps, and where the
+solver pushes it further than it may, between two walls for instance, the substep is not made.
 """
 
 import math
@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pymunk
-from phototaxis.arena import Arena
-from phototaxis.errors import UserError
-from phototaxis.strides import deepest, furthest, strides
+from phototaxis.geometry.arena import Arena
+from phototaxis.geometry.substeps import max_move, max_overlap, substeps
+from phototaxis.runtime.errors import UserError
 from phototaxis_world.shapes import static_shapes
 
 _ROBOT = 1
-_FAR = -100_000.0
-_TRIES = 10_000
-_MASS = 10.0
+_FAR_M = -100_000.0
+_MAX_TRIES = 10_000
+_MASS_KG = 10.0
 _GRIP = 100.0
 """How much harder the wheels make it for a contact to turn the body (times the body's own inertia)."""
 
@@ -32,7 +32,7 @@ class Pose(NamedTuple):
     heading: float
 
 
-class Motion(NamedTuple):
+class DriveResult(NamedTuple):
     """Where a control period has led."""
 
     pose: Pose
@@ -58,7 +58,7 @@ def new_space(arena: Arena) -> pymunk.Space:
 def add_robot(space: pymunk.Space, arena: Arena) -> tuple[pymunk.Body, pymunk.Poly]:
     """Add the robot's body."""
     size = (arena.robot.length, arena.robot.width)
-    body = pymunk.Body(_MASS, _GRIP * pymunk.moment_for_box(_MASS, size))
+    body = pymunk.Body(_MASS_KG, _GRIP * pymunk.moment_for_box(_MASS_KG, size))
     box = pymunk.Poly.create_box(body, size)
     box.collision_type = _ROBOT
     box.friction = arena.motion.friction
@@ -66,19 +66,19 @@ def add_robot(space: pymunk.Space, arena: Arena) -> tuple[pymunk.Body, pymunk.Po
     return body, box
 
 
-def step_of(arena: Arena) -> tuple[float, int]:
-    """Seconds of one stride of the solver, and how many of them make one control period."""
-    count = strides(arena)
+def substep_of(arena: Arena) -> tuple[float, int]:
+    """Seconds of one substep of the solver, and how many of them make one control period."""
+    count = substeps(arena)
     return arena.motion.physics_step / count, arena.physics_steps * count
 
 
-def undo(body: pymunk.Body, position: tuple[float, float], angle: float, dt: float) -> None:
-    """Put a body back to where a stride began, at rest."""
-    spend(body, dt)
+def undo_substep(body: pymunk.Body, position: tuple[float, float], angle: float, dt: float) -> None:
+    """Put a body back to where a substep began, at rest."""
+    bring_to_rest(body, dt)
     body.position, body.angle = position, angle
 
 
-def spend(body: pymunk.Body, dt: float) -> None:
+def bring_to_rest(body: pymunk.Body, dt: float) -> None:
     """Bring a body to rest, with what the solver has in store to push it out of a wall."""
     body.velocity, body.angular_velocity = (0, 0), 0
     pymunk.Body.update_position(body, dt)
@@ -97,11 +97,11 @@ class Physics:
 
     def __init__(self, arena: Arena):
         self._arena, self._robot = arena, arena.robot
-        self._dt, self._steps = step_of(arena)
-        self._strides = strides(arena)
-        self._deepest, self._furthest = deepest(arena), furthest(arena)
+        self._dt, self._steps = substep_of(arena)
+        self._substeps = substeps(arena)
+        self._max_overlap, self._max_move = max_overlap(arena), max_move(arena)
         self._depth = -1.0
-        """How deep the body overlapped something after the last stride, m; −1 where it touched nothing."""
+        """How deep the body overlapped something after the last substep, m; −1 where it touched nothing."""
         self._stall = arena.motion.collision == "stall"
         self._front = self._rear = False
         space = self._space = new_space(arena)
@@ -113,10 +113,10 @@ class Physics:
         self._probe = pymunk.Poly.create_box(None, (size[0] + 2 * clear, size[1] + 2 * clear))
         space.on_collision(_ROBOT, None, post_solve=self._touched)
 
-    def place(self, pose: Pose) -> Motion:
+    def place(self, pose: Pose) -> DriveResult:
         """Put the robot at rest at a pose."""
         body, space = self._body, self._space
-        for x, y, heading in ((_FAR, _FAR, 0.0), pose):  # far away all contacts expire
+        for x, y, heading in ((_FAR_M, _FAR_M, 0.0), pose):  # far away all contacts expire
             body.position, body.angle = (x, y), heading
             body.velocity, body.angular_velocity = (0, 0), 0
             space.reindex_shapes_for_body(body)
@@ -124,7 +124,7 @@ class Physics:
                 self._depth = -1.0
                 space.step(self._dt)
         self._front = self._rear = False
-        return Motion(pose, 0.0, 0.0, False, False)
+        return DriveResult(pose, 0.0, 0.0, False, False)
 
     def free(self, pose: Pose) -> bool:
         """Whether the robot, with the placement's clearance around it, touches nothing at a pose."""
@@ -153,7 +153,7 @@ class Physics:
         """
         width, height = self._arena.size
         away, found = self._arena.placement.light_distance, list[Pose]()
-        for tried in range(1, _TRIES + 1):
+        for tried in range(1, _MAX_TRIES + 1):
             u, v, w = rng.random(3).tolist()
             pose = Pose(u * width, v * height, (2 * w - 1) * math.pi)
             distances = (math.dist(pose[:2], light.position) for light in self._arena.lights)
@@ -162,24 +162,24 @@ class Physics:
                 if len(found) == count:
                     return found, count / tried
         if found:
-            return found, len(found) / _TRIES
+            return found, len(found) / _MAX_TRIES
         raise UserError(
             f"arena {self._arena.name}: the robot ({self._robot.length} × {self._robot.width} m) fits nowhere: no free "
-            f"place {away} m from the lights in {_TRIES} tries; make room, or lower placement.light_distance or "
+            f"place {away} m from the lights in {_MAX_TRIES} tries; make room, or lower placement.light_distance or "
             f"placement.clearance"
         )
 
-    def drive(self, left: float, right: float) -> Motion:
+    def drive(self, left: float, right: float) -> DriveResult:
         """Hold a wheel command (−1..1 each) for one control period."""
         self._front = self._rear = False
         speed = self._robot.speed * (left + right) / 2
         turn = self._robot.turn * (right - left) / 2
         return self._refuse_contact(speed, turn) if self._stall else self._slide(speed, turn)
 
-    def _slide(self, speed: float, turn: float) -> Motion:
+    def _slide(self, speed: float, turn: float) -> DriveResult:
         """One solve at rest, so that old contacts meet the new command, then solve and move in turn."""
         body, step, dt = self._body, self._space.step, self._dt
-        push, torque = _MASS * speed / dt, self._moment * turn / dt
+        push, torque = _MASS_KG * speed / dt, self._moment * turn / dt
         body.velocity, body.angular_velocity = (0, 0), 0
         for _ in range(self._steps + 1):
             angle = body.angle
@@ -189,21 +189,21 @@ class Physics:
             body.torque = torque
             step(dt)
             if before is not None and self._astray(before, angle):
-                undo(body, before, angle, dt)
+                undo_substep(body, before, angle, dt)
                 self._depth = 0.0
         angle = body.angle
         vx, vy = body.velocity
         x, y = body.position
         forward = vx * math.cos(angle) + vy * math.sin(angle)
         heading = math.remainder(angle, math.tau)
-        return Motion(Pose(x, y, heading), forward, body.angular_velocity, self._front, self._rear)
+        return DriveResult(Pose(x, y, heading), forward, body.angular_velocity, self._front, self._rear)
 
     def _astray(self, before: tuple[float, float], angle: float) -> bool:
-        """Whether the solver has pushed the body too deep into something, or too far in one stride."""
+        """Whether the solver has pushed the body too deep into something, or too far in one substep."""
         moved = math.dist(before, self._body.position) + self._radius * abs(self._body.angle - angle)
-        return self._depth > self._deepest or moved > self._furthest
+        return self._depth > self._max_overlap or moved > self._max_move
 
-    def _refuse_contact(self, speed: float, turn: float) -> Motion:
+    def _refuse_contact(self, speed: float, turn: float) -> DriveResult:
         """A physics step that would touch anything is not made at all (the Pyro simulator's stall)."""
         pose = Pose(*self._body.position, self._body.angle)
         moved = True
@@ -219,11 +219,11 @@ class Physics:
         self._body.position, self._body.angle = (x, y), angle
         heading = math.remainder(angle, math.tau)
         at_end = (speed, turn) if moved else (0.0, 0.0)
-        return Motion(Pose(x, y, heading), *at_end, self._front, self._rear)
+        return DriveResult(Pose(x, y, heading), *at_end, self._front, self._rear)
 
     def _ahead(self, pose: Pose, speed: float, turn: float) -> Pose | None:
-        """Where a physics step leads, stride by stride; None when one of them would touch anything."""
-        for _ in range(self._strides):
+        """Where a physics step leads, substep by substep; None when one of them would touch anything."""
+        for _ in range(self._substeps):
             x, y, angle = pose
             heading = angle + turn * self._dt
             middle = (angle + heading) / 2

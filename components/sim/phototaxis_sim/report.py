@@ -2,8 +2,8 @@
 
 from collections import Counter, deque
 
-from phototaxis.machine import Refusal
-from phototaxis.messages import Recorded, Status
+from phototaxis.runtime.machine import Refusal
+from phototaxis.wire.messages import RecordingProgress, Status
 
 from phototaxis_sim.lateness import Lateness
 from phototaxis_sim.pace import Pace
@@ -37,7 +37,7 @@ class Report:
         self.alive: set[str] = set()
         self.refused: Counter[str] = Counter()
         self.recent: deque[bool] = deque(maxlen=MAX_RECENT)
-        self.recorded: Recorded | None = None
+        self.recorded: RecordingProgress | None = None
         self.sensed: int | None = None
         self.unkept, self.due_at = "", 0.0
         self._told_slow = False

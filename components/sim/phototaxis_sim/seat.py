@@ -1,9 +1,9 @@
 """The one seat: who may drive, who drives next, and who stands by."""
 
-from phototaxis.codec import Refused
-from phototaxis.messages import How, Seating
+from phototaxis.wire.codec import Refused
+from phototaxis.wire.messages import SeatChange, SeatChangeReason
 
-KEPT = 50
+MAX_HISTORY = 50
 """Holders of the seat that are remembered."""
 
 
@@ -27,7 +27,7 @@ class Seat:
         self.driver, self.heir = "", heir
         self.standbys: list[str] = []
         self.reserved: dict[str, int] = {}
-        self.history: list[Seating] = []
+        self.history: list[SeatChange] = []
 
     @property
     def waiting(self) -> list[str]:
@@ -109,12 +109,12 @@ class Seat:
             self._give(agent, tick, "took over" if agent in self.reserved else "stood by")
         return bool(agent)
 
-    def _give(self, agent: str, tick: int, how: How) -> None:
+    def _give(self, agent: str, tick: int, how: SeatChangeReason) -> None:
         self.reserved.pop(agent, None)
         if agent in self.standbys:
             self.standbys.remove(agent)
         self.driver, self.heir = agent, ""
-        self.history = [*self.history, Seating(driver=agent, tick=tick, how=how)][-KEPT:]
+        self.history = [*self.history, SeatChange(driver=agent, tick=tick, how=how)][-MAX_HISTORY:]
 
 
 def _named(agent: str) -> None:

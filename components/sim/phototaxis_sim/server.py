@@ -3,22 +3,22 @@
 import secrets
 from functools import partial
 
-from phototaxis.bus import Bus
-from phototaxis.chunks import Chunks
-from phototaxis.journal import Journal
-from phototaxis.runner import Runner
-from phototaxis.store import Store
+from phototaxis.runtime.bus import Bus
+from phototaxis.runtime.chunks import LogPublisher
+from phototaxis.runtime.journal import Journal
+from phototaxis.runtime.runner import Runner
+from phototaxis.runtime.store import Store
 
+from phototaxis_sim.batch_simulation import BatchSimulation
 from phototaxis_sim.continued import open_journal
 from phototaxis_sim.log import chunks
-from phototaxis_sim.many import SimulationOfMany
 from phototaxis_sim.pace import Pace
 from phototaxis_sim.simulation import Simulation
 from phototaxis_sim.stepper import Stepper
 
 
 def serve(
-    bus: Bus, simulation: Simulation | SimulationOfMany, pace: Pace, journal: Journal | None, patience: float
+    bus: Bus, simulation: Simulation | BatchSimulation, pace: Pace, journal: Journal | None, driver_timeout: float
 ) -> None:
     """Run until a "stop" event or request.
 
@@ -33,5 +33,5 @@ def serve(
         when it cannot be begun, or was given up before the simulation died.
     """
     found = open_journal(journal, simulation) if journal is not None and isinstance(simulation, Simulation) else None
-    stepper = Stepper(simulation, pace, partial(secrets.token_hex, 2), found, patience)
-    Runner(bus, stepper, Store(journal), Chunks(bus, "log/sim", chunks(bus.ident))).run()
+    stepper = Stepper(simulation, pace, partial(secrets.token_hex, 2), found, driver_timeout)
+    Runner(bus, stepper, Store(journal), LogPublisher(bus, "log/sim", chunks(bus.ident))).run()

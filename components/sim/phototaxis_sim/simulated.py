@@ -2,7 +2,7 @@
 
 from typing import Any, Protocol
 
-from phototaxis.messages import EndedEpisode, State, World
+from phototaxis.wire.messages import EndedEpisode, State, World
 
 from phototaxis_sim.simulation import Snapshot
 
@@ -14,7 +14,7 @@ class Simulated(Protocol):
     def world(self) -> World: ...
     @property
     def state(self) -> Any:
-        """The present tick as it is published: a `State` or a `StateOfMany`."""
+        """The present tick as it is published: a `State` or a `BatchState`."""
         ...
 
     @property

@@ -5,13 +5,13 @@ import struct
 
 import numpy as np
 from msgspec import Struct
-from phototaxis.arena import Arena
-from phototaxis.errors import UserError
-from phototaxis.messages import Command, CommandOfMany, End, EndedEpisode, State, World
+from phototaxis.geometry.arena import Arena
+from phototaxis.runtime.errors import UserError
+from phototaxis.wire.messages import BatchCommand, Command, End, EndedEpisode, State, World
 
-from phototaxis_sim.physics import Motion, Physics, Pose
+from phototaxis_sim.physics import DriveResult, Physics, Pose
 
-_MOST_IDLE = 1000
+_MAX_IDLE_EPISODES = 1000
 """Episodes in succession that begin where the light is reached already."""
 _HASHED = struct.Struct("<8sqqqddddddd")
 
@@ -77,7 +77,7 @@ class Simulation:
         """Whether the light was reached, for each episode that ended in the last `advance`."""
         return [] if self.ended is None else [self.ended.end == "terminated"]
 
-    def check(self, command: Command | CommandOfMany) -> None:
+    def check(self, command: Command | BatchCommand) -> None:
         """No-op: decoding has validated the command of one robot."""
 
     @property
@@ -110,10 +110,11 @@ class Simulation:
             self.episodes += 1
             self.reached += end == "terminated"
             self._idle = self._idle + 1 if end == "terminated" and not self._steps else 0
-            if self._idle >= _MOST_IDLE:
+            if self._idle >= _MAX_IDLE_EPISODES:
                 raise UserError(
                     f"arena {self.world.arena.name}: the light was reached before the first step in the last "
-                    f"{_MOST_IDLE} episodes; begin further from the lights (placement.light_distance), or dim them"
+                    f"{_MAX_IDLE_EPISODES} episodes; begin further from the lights (placement.light_distance), or "
+                    f"dim them"
                 )
             self._episode += 1
             self._steps = 0
@@ -155,7 +156,7 @@ class Simulation:
         self._start = self._physics.random_pose(rng) if start is None else start
         return self._report(self._physics.place(self._start), 0.0, 0.0, "")
 
-    def _report(self, motion: Motion, left: float, right: float, author: str) -> State:
+    def _report(self, motion: DriveResult, left: float, right: float, author: str) -> State:
         (x, y, heading), speed, turn, front, rear = motion
         tick, episode, epoch = self._tick, self._episode, self._epoch
         contacts = front + 2 * rear

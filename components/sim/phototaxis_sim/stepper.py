@@ -3,10 +3,10 @@
 import math
 from collections.abc import Callable
 
-from phototaxis.codec import Refused
-from phototaxis.machine import Effect, Event, Flush, Listen, Publish, Reply, Say, Stop, Unwritten, Warn
-from phototaxis.messages import Control, ControlReply, Status
-from phototaxis.topics import step_topics
+from phototaxis.runtime.machine import Effect, Event, Flush, Listen, Publish, Reply, Say, Stop, Unwritten, Warn
+from phototaxis.wire.codec import Refused
+from phototaxis.wire.messages import Control, ControlReply, Status
+from phototaxis.wire.topics import step_topics
 
 from phototaxis_sim.continued import Continued, Entry
 from phototaxis_sim.pace import Pace
@@ -30,7 +30,7 @@ class Stepper:
     pace : lockstep or real time.
     suffix : makes four hexadecimal digits for the name of a run that is begun by request.
     found : where a killed simulation was; its simulation takes the place of the fresh one.
-    patience : seconds after which a silent driver loses the seat to whoever waits for it.
+    driver_timeout : seconds after which a silent driver loses the seat to whoever waits for it.
     """
 
     def __init__(
@@ -39,10 +39,10 @@ class Stepper:
         pace: Pace,
         suffix: Callable[[], str],
         found: Continued | None = None,
-        patience: float = 5.0,
+        driver_timeout: float = 5.0,
     ):
         self.steps = steps = Steps(simulation, pace)
-        self._root, self._suffix, self._patience = simulation.world.run[:50], suffix, patience
+        self._root, self._suffix, self._driver_timeout = simulation.world.run[:50], suffix, driver_timeout
         self._topics = step_topics(simulation.world.robots)
         self._heir_until = self._stop_by = math.inf
         if found is not None:
@@ -57,7 +57,7 @@ class Stepper:
             "alive": lambda event: steps.report.alive.add("/".join(event.message)),
             "gone": self._gone,
             "refused": lambda event: steps.report.refuse(event.message),
-            "unwritten": self._unwritten,
+            "write_failure": self._unwritten,
             "stop": lambda _: self._end(),
         }
         self._verbs: dict[str, Callable[[Control], object]] = {
@@ -86,7 +86,7 @@ class Stepper:
             at = min(at, steps.question.repeat_at)
         if self._clocked:
             at = min(at, steps.pace.ends_at)
-        return min(at, steps.heard_at + self._patience) if self._contested else at
+        return min(at, steps.heard_at + self._driver_timeout) if self._contested else at
 
     def on(self, event: Event, now: float) -> list[Effect]:
         """What follows from an event: from itself, and from the time that has come."""
@@ -131,8 +131,8 @@ class Stepper:
                 steps.seat.heir = ""
                 if steps.seat.vacate(steps.tick):
                     steps.ask()
-        if self._contested and now >= steps.heard_at + self._patience:
-            who = f"{steps.seat.driver} has been silent for {self._patience:g} s"
+        if self._contested and now >= steps.heard_at + self._driver_timeout:
+            who = f"{steps.seat.driver} has been silent for {self._driver_timeout:g} s"
             steps.out.append(Say(f"{who} and loses the seat at tick {steps.tick}"))
             steps.seat.vacate(steps.tick)
             steps.ask()

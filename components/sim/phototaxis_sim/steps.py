@@ -1,12 +1,12 @@
 """The step itself: a command comes, is held, is applied once, and the next tick is asked."""
 
 import msgspec
-from phototaxis.codec import Refused
-from phototaxis.machine import Append, Begin, Effect, Flush, Publish, Refusal, Refuse, Say
-from phototaxis.messages import Command, CommandOfMany, EndedEpisode, State
-from phototaxis.protocol import Question
-from phototaxis.topics import step_topics
-from phototaxis.transitions import Transitions
+from phototaxis.runtime.machine import Append, Begin, Effect, Flush, Publish, Refusal, Refuse, Say
+from phototaxis.runtime.protocol import RetransmitTimer
+from phototaxis.runtime.transitions import Transitions
+from phototaxis.wire.codec import Refused
+from phototaxis.wire.messages import BatchCommand, Command, EndedEpisode, State
+from phototaxis.wire.topics import step_topics
 
 from phototaxis_sim.continued import Continued, Entry
 from phototaxis_sim.lateness import Lateness
@@ -35,9 +35,9 @@ class Steps:
     def __init__(self, simulation: Simulated, pace: Pace):
         self.simulation, self.pace = simulation, pace
         self.seat, self.report, self.lateness = Seat(), Report(), Lateness()
-        self.question, self.phase = Question(), Transitions(TABLE, Phase.WAITING)
+        self.question, self.phase = RetransmitTimer(), Transitions(TABLE, Phase.WAITING)
         self.now, self.heard_at, self.out = 0.0, 0.0, list[Effect]()
-        self.held: Command | CommandOfMany | None = None
+        self.held: Command | BatchCommand | None = None
         self.steps_due = 0
         """Single steps that are still to be made of a paused run."""
         self._state_topic = step_topics(simulation.world.robots).state
@@ -66,7 +66,7 @@ class Steps:
         found = self.simulation.snapshot(list(self.report.recent), self.seat.driver)
         return None if found is None else msgspec.msgpack.encode(found)
 
-    def command(self, command: Command | CommandOfMany) -> None:
+    def command(self, command: Command | BatchCommand) -> None:
         """Take a command, if it is the driver's, for the present tick."""
         state = self.simulation.state
         try:

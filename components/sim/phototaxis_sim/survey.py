@@ -3,17 +3,17 @@
 from collections.abc import Iterator
 
 import numpy as np
-from phototaxis.arena import Arena
-from phototaxis.errors import UserError
-from phototaxis.sight import LightSensors, Obstacles
-from phototaxis.solids import extent, solids
+from phototaxis.geometry.arena import Arena
+from phototaxis.geometry.sight import LightSensors, Obstacles
+from phototaxis.geometry.solids import extent, solids
+from phototaxis.runtime.errors import UserError
 from phototaxis.task import GOAL_LIGHT
 
-from phototaxis_sim.grid import Grid
 from phototaxis_sim.physics import Physics, Pose
+from phototaxis_sim.reachability import ReachabilityGrid
 
 _PLACEMENTS = 300
-_MOST_SOLIDS = 5_000
+_MAX_SOLIDS = 5_000
 _NEARLY_ALWAYS, _OFTEN, _SELDOM = 0.95, 0.5, 0.01
 
 
@@ -61,9 +61,9 @@ def _outside(arena: Arena) -> Iterator[str]:
 
 def _cut_off(arena: Arena, starts: list[Pose]) -> list[str]:
     """Whether there are places from which every light seems to be out of reach."""
-    if len(list(solids(arena))) > _MOST_SOLIDS:
+    if len(list(solids(arena))) > _MAX_SOLIDS:
         return []
-    grid = Grid(arena)
+    grid = ReachabilityGrid(arena)
     if grid.coarse:
         return []
     lost = sum(not grid.hopeful(start.x, start.y) for start in starts)

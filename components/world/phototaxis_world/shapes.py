@@ -1,7 +1,7 @@
 """The arena's static shapes for pymunk, the same for physics and rays (needs the extra world)."""
 
 import pymunk
-from phototaxis.arena import Arena
+from phototaxis.geometry.arena import Arena
 
 
 def static_shapes(arena: Arena, body: pymunk.Body) -> list[pymunk.Shape]:

@@ -11,8 +11,8 @@ from phototaxis_agent.learner import Learner, Transition
 from phototaxis_agent.perceptron import PRESETS, Hyperparameters, Perceptron
 from phototaxis_agent.threads import one_thread
 
-REWARDS = (-2.0, 0.0, 2.0, 3.0)
-MAPPED = (0.0, 0.5, 0.75, 1.0)
+REWARD_POINTS = (-2.0, 0.0, 2.0, 3.0)
+TARGET_POINTS = (0.0, 0.5, 0.75, 1.0)
 """What the paper's reinforcement values become for a net whose output is in 0..1; linear in between."""
 
 
@@ -39,26 +39,26 @@ class Ann(Learner):
         ]
 
     @one_thread
-    def values_of(self, states: np.ndarray) -> np.ndarray:
+    def batch_values(self, states: np.ndarray) -> np.ndarray:
         count, actions = len(states), len(self._allowed)
         pairs = self._pairs(np.repeat(states, actions, axis=0), np.tile(self._allowed, (count, 1)))
         return self._net.output(self._net.hidden(pairs)).numpy().reshape(count, actions)
 
     def values(self, state: PerceptState) -> list[float]:
-        return self.values_of(np.array([state], dtype=float))[0].tolist()
+        return self.batch_values(np.array([state], dtype=float))[0].tolist()
 
     @one_thread
     def learn(self, transition: Transition) -> float:
         """Equation 1 makes the target, back-propagation moves the net's output towards it."""
-        state, action, reward, following, terminated, *_ = transition
+        state, action, reward, next_state, terminated, *_ = transition
         if not self.linear:
-            reward = float(np.interp(reward, REWARDS, MAPPED))
+            reward = float(np.interp(reward, REWARD_POINTS, TARGET_POINTS))
         inputs = self._pairs(np.array([state], dtype=float), self._motors[action : action + 1])
         hidden = self._net.hidden(inputs)
         before = self._net.output(hidden).item()
-        target = reward if terminated else reward + self._options.gamma * max(self.values(following))
+        target = reward if terminated else reward + self._options.gamma * max(self.values(next_state))
         error = target - before
-        target = before + self._options.alpha * error
+        target = before + self._options.target_rate * error
         self._net.learn(inputs[0, 0], hidden[0, 0], before, target if self.linear else min(max(target, 0.0), 1.0))
         return error
 

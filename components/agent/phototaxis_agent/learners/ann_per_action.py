@@ -8,7 +8,7 @@ from phototaxis.task import ACTIONS, Percept, PerceptState
 
 from phototaxis_agent.inputs import Scaled
 from phototaxis_agent.learner import Learner, Transition
-from phototaxis_agent.learners.ann import MAPPED, REWARDS
+from phototaxis_agent.learners.ann import REWARD_POINTS, TARGET_POINTS
 from phototaxis_agent.perceptron import PRESETS, Hyperparameters, Perceptron
 from phototaxis_agent.threads import one_thread
 
@@ -28,25 +28,25 @@ class AnnPerAction(Learner):
         return self._net.hidden(torch.from_numpy(self._scaled(states)).expand(len(ACTIONS), -1, -1))
 
     @one_thread
-    def values_of(self, states: np.ndarray) -> np.ndarray:
+    def batch_values(self, states: np.ndarray) -> np.ndarray:
         return self._net.output(self._hidden(states)).numpy()[self._allowed].T
 
     def values(self, state: PerceptState) -> list[float]:
-        return self.values_of(np.array([state], dtype=float))[0].tolist()
+        return self.batch_values(np.array([state], dtype=float))[0].tolist()
 
     @one_thread
     def learn(self, transition: Transition) -> float:
         """As `Ann`, with the net of the action."""
-        state, action, reward, following, terminated, *_ = transition
-        reward = float(np.interp(reward, REWARDS, MAPPED))
-        both = np.array([state, following], dtype=float)
+        state, action, reward, next_state, terminated, *_ = transition
+        reward = float(np.interp(reward, REWARD_POINTS, TARGET_POINTS))
+        both = np.array([state, next_state], dtype=float)
         hidden = self._hidden(both)
         values = self._net.output(hidden).numpy()
         before = float(values[action, 0])
         target = reward if terminated else reward + self._options.gamma * float(values[self._allowed, 1].max())
         error = target - before
         inputs = torch.from_numpy(self._scaled(both[0]))
-        target = min(max(before + self._options.alpha * error, 0.0), 1.0)
+        target = min(max(before + self._options.target_rate * error, 0.0), 1.0)
         self._net.learn(inputs, hidden[action, 0], before, target, action)
         return error
 

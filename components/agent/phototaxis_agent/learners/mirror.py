@@ -16,7 +16,7 @@ from phototaxis.task import ACTIONS, MIRRORED, Percept, PerceptState
 from phototaxis_agent import context
 from phototaxis_agent.learner import Learner, Transition, discrete, stored, stored_rows
 
-FORGOTTEN = 0.01
+MIN_TRACE = 0.01
 """A trace that has decayed below this is dropped."""
 
 
@@ -25,13 +25,13 @@ class Hyperparameters(Struct, frozen=True, kw_only=True):
 
     gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.8
     """discount factor γ of equation 1"""
-    decay: Annotated[float, Meta(ge=0, le=1)] = 0.8
+    trace_decay: Annotated[float, Meta(ge=0, le=1)] = 0.8
     """trace decay λ: 0 fits each step to the next, 1 to all that followed"""
-    start: Annotated[float, Meta(ge=-100, le=100)] = 0.3
+    initial_value: Annotated[float, Meta(ge=-100, le=100)] = 0.3
     """value of an entry without experience; optimism makes the robot try everything"""
     ridge: Annotated[float, Meta(gt=0, le=1000)] = 0.5
     """how many experiences the first value counts for"""
-    memory: Literal["none", "last"] = "last"
+    context: Literal["none", "last"] = "last"
     """none: the percept alone is the state; last: also the last action and whether it got brighter"""
 
 
@@ -43,17 +43,23 @@ class Mirror(Learner):
 
     Options = Hyperparameters
     presets: ClassVar[dict[str, dict[str, Any]]] = {
-        "": {"reward": "potential", "hot": 0.12, "cold": 0.06, "cooling": 0.6, "max_episode_steps": 200},
-        "rich": {"max_episode_steps": 100, "cold": 0.1, "start": 1.0, "ridge": 1.0},
+        "": {
+            "reward": "potential",
+            "temperature_start": 0.12,
+            "temperature_end": 0.06,
+            "exploration_fraction": 0.6,
+            "max_episode_steps": 200,
+        },
+        "rich": {"max_episode_steps": 100, "temperature_end": 0.1, "initial_value": 1.0, "ridge": 1.0},
     }
 
     def __init__(self, options: Hyperparameters, percept: Percept, rng: np.random.Generator):
         self._options, self._percept, self._allowed = options, discrete(percept), list(percept.actions)
-        if options.memory == "last":
-            self.context = context.BLANK
+        if options.context == "last":
+            self.context = context.INITIAL_CONTEXT
         self._entries: dict[PerceptState, list[int]] = {}
         self._met: list[tuple[float, ...]] = []
-        self._table = np.array([options.start])
+        self._table = np.array([options.initial_value])
         """Entry 0 stands for everything that was not tried yet."""
         self._spread = np.zeros((1, 1))
         """How far an error at one entry moves the others: the inverse of the least squares' matrix."""
@@ -70,14 +76,14 @@ class Mirror(Learner):
 
     def learn(self, transition: Transition) -> float:
         """Fit the step before this one, now that the action that followed it is known."""
-        state, action, reward, following, terminated, _, first = transition
+        state, action, reward, next_state, terminated, _, first = transition
         entry, error = self._entry(state, action), 0.0
         if self._open:
             last, last_reward, *reached = self._open
             error = self._fit(int(last), last_reward, self._best(tuple(reached)) if first else entry)
         if first:
             self._traces.clear()
-        self._open = (entry, reward, *following)
+        self._open = (entry, reward, *next_state)
         if terminated:
             error = self._fit(entry, reward, None)
             self._open = ()
@@ -88,8 +94,8 @@ class Mirror(Learner):
         """Let the table fit one more equation, Q(entry) = reward + γ Q(following), exactly; the error before."""
         gamma, size = self._options.gamma, len(self._met) + 1
         table, spread = self._table[:size], self._spread[:size, :size]
-        fade = gamma * self._options.decay
-        self._traces = {one: fade * trace for one, trace in self._traces.items() if fade * trace > FORGOTTEN}
+        fade = gamma * self._options.trace_decay
+        self._traces = {one: fade * trace for one, trace in self._traces.items() if fade * trace > MIN_TRACE}
         self._traces[entry] = self._traces.get(entry, 0.0) + 1.0
         gain = np.zeros(size)
         for one, trace in self._traces.items():
@@ -116,7 +122,7 @@ class Mirror(Learner):
             self._met.append((*state, action))
             number = len(self._met)
             if number == len(self._table):
-                self._table = np.append(self._table, np.full(number, self._options.start))
+                self._table = np.append(self._table, np.full(number, self._options.initial_value))
                 self._spread = np.pad(self._spread, (0, number))
             self._spread[number, number] = 1 / self._options.ridge
             entries[action] = self._entries.setdefault(image, [0] * len(ACTIONS))[MIRRORED[action]] = number

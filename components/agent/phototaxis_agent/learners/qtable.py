@@ -7,15 +7,15 @@ import numpy as np
 from msgspec import Meta, Struct
 from phototaxis.task import ACTIONS, Percept, PerceptState
 
-from phototaxis_agent.learner import Learner, Transition, discrete, falling, stored
+from phototaxis_agent.learner import Learner, Transition, annealed, discrete, stored
 
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
     """Of the table."""
 
-    alpha: Annotated[float, Meta(gt=0, le=1)] = 0.16
-    """learning rate α of equation 1 at the first epoch; it falls geometrically to `alpha_end`"""
-    alpha_end: Annotated[float, Meta(gt=0, le=1)] = 0.01
+    learning_rate: Annotated[float, Meta(gt=0, le=1)] = 0.16
+    """learning rate α of equation 1 at the first epoch; it falls geometrically to `learning_rate_end`"""
+    learning_rate_end: Annotated[float, Meta(gt=0, le=1)] = 0.01
     """learning rate at the end of the budget and after it"""
     gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.75
     """discount factor γ of equation 1"""
@@ -41,12 +41,12 @@ class QTable(Learner):
 
     def learn(self, transition: Transition) -> float:
         """Equation 1: Q(s, a) += α [r + γ max Q(s', a') − Q(s, a)]; at the light nothing follows."""
-        state, action, reward, following, terminated, progress, _ = transition
+        state, action, reward, next_state, terminated, progress, _ = transition
         options = self._options
-        target = reward if terminated else reward + options.gamma * max(self.values(following))
+        target = reward if terminated else reward + options.gamma * max(self.values(next_state))
         row = self._table[self._index[state]]
         error = target - row[action]
-        row[action] += falling(options.alpha, options.alpha_end, progress) * error
+        row[action] += annealed(options.learning_rate, options.learning_rate_end, progress) * error
         return error
 
     def save(self) -> dict[str, np.ndarray]:

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from phototaxis.messages import ENDS, Readings
 from phototaxis.task.history import LightHistory
 from phototaxis.task.observation import at_goal
+from phototaxis.wire.messages import ENDS, Readings
 
 TERMINATED, TRUNCATED, RESET = (ENDS.index(end) for end in ("terminated", "truncated", "reset"))
 """The numbers of an episode's ends in `ENDS`."""

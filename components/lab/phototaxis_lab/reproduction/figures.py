@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
-from phototaxis.disk import write_whole
+from phototaxis.runtime.disk import write_atomic
 from phototaxis.task import ACTIONS
 
-from phototaxis_lab.cell import CURVE, Outcome
+from phototaxis_lab.cell import CURVE_POINTS, Outcome
 from phototaxis_lab.statistics import mean_interval
 
 STYLE: dict[Any, Any] = {
@@ -74,7 +74,7 @@ def success(path: Path, systems: Mapping[str, Runs], lines: Mapping[str, float],
 def accumulated_reward(path: Path, systems: Mapping[str, Sequence[Outcome]], epochs: int) -> None:
     """Accumulated reward over time: each seed thin, the mean bold (figure 11)."""
     figure, all_axes = _figure(6.4, 3.0, columns=len(systems))
-    x = np.linspace(epochs / CURVE, epochs, CURVE)
+    x = np.linspace(epochs / CURVE_POINTS, epochs, CURVE_POINTS)
     for axes, (name, outcomes), (colour, *_) in zip(all_axes, systems.items(), LOOKS, strict=False):
         curves = np.array([outcome.rewards for outcome in outcomes])
         axes.plot(x, curves.T, color=colour, alpha=0.3, linewidth=0.6)
@@ -132,4 +132,4 @@ def _legend_below(axes: Axes) -> None:
 def _save(figure: Figure, path: Path) -> None:
     drawn = BytesIO()
     figure.savefig(drawn, format="png", metadata={"Software": None})
-    write_whole(path, drawn.getvalue())
+    write_atomic(path, drawn.getvalue())

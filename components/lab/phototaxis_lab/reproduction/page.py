@@ -6,7 +6,7 @@ from string import Template
 
 import msgspec
 import numpy as np
-from phototaxis.disk import write_whole
+from phototaxis.runtime.disk import write_atomic
 from phototaxis.task import FORWARD, PERCEPTS
 from phototaxis_sim import arenas
 
@@ -53,7 +53,7 @@ def write(folder: Path, data: Data, fresh: Fresh, seeds: range) -> None:
         fresh_first=fresh_seeds(seeds).start,
         fresh_last=fresh_seeds(seeds).stop - 1,
     )
-    write_whole(folder / "README.md", text.encode())
+    write_atomic(folder / "README.md", text.encode())
 
 
 def controllers(name: str, seeds: range) -> dict[str, list[Evaluation]]:

@@ -1,0 +1,1 @@
+"""Who may reach the bus and do what: open endpoints, access rights, router configurations."""

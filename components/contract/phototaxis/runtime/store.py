@@ -1,0 +1,62 @@
+"""What a component keeps on disk: a checkpoint and the journal of what happened since."""
+
+from pathlib import Path
+
+from phototaxis.runtime.checkpoint import save
+from phototaxis.runtime.disk import write_failure
+from phototaxis.runtime.errors import Unavailable, UserError
+from phototaxis.runtime.journal import Journal
+from phototaxis.runtime.machine import Append, Begin, Save, Unwritten
+
+
+class Store:
+    """Carries out `Begin`, `Append` and `Save`; without a file they do nothing.
+
+    A journal that cannot be written is given up, with a mark in the file that says so, until it is begun anew.
+
+    Attributes
+    ----------
+    fault : why the last checkpoint of the process could not be written; None while all is well.
+    """
+
+    def __init__(self, journal: Journal | None = None, checkpoint: Path | None = None):
+        self._journal, self._checkpoint = journal, checkpoint
+        self.fault: UserError | None = None
+
+    def carry(self, effect: Begin | Append | Save) -> Unwritten | None:
+        """Write; what the machine is told when the disk does not take it."""
+        if isinstance(effect, Save):
+            return self._save(effect) or self._begin(effect.header)
+        return self._begin(effect.header) if isinstance(effect, Begin) else self._append(effect.entry)
+
+    def _save(self, effect: Save) -> Unwritten | None:
+        if self._checkpoint is None:
+            return None
+        try:
+            save(self._checkpoint, effect.meta, effect.arrays)
+        except Unavailable as fault:
+            self.fault = fault if effect.last else None
+            return Unwritten("checkpoint", str(fault))
+        return None
+
+    def _begin(self, header: bytes) -> Unwritten | None:
+        if self._journal is None:
+            return None
+        try:
+            self._journal.begin(header)
+        except OSError as error:
+            return self._give_up(self._journal, error)
+        return None
+
+    def _append(self, entry: bytes) -> Unwritten | None:
+        if self._journal is None or not self._journal.kept:
+            return None
+        try:
+            self._journal.append(entry)
+        except OSError as error:
+            return self._give_up(self._journal, error)
+        return None
+
+    def _give_up(self, journal: Journal, error: OSError) -> Unwritten:
+        journal.give_up()
+        return Unwritten("journal", str(write_failure(journal.path, error)))
