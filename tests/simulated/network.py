@@ -3,6 +3,7 @@
 Every message is encoded by its sender and decoded by each receiver, as on the bus.
 """
 
+from collections.abc import Callable
 from random import Random
 from typing import Any
 
@@ -51,7 +52,11 @@ class Query:
     def send(self) -> None:
         """Ask everybody who may answer; where nobody is, the empty answer comes at once."""
         topic, wanted, network = TOPICS[self._ask.topic], self._ask.agent, self._network
-        asked = [one for one in network.processes if one.role == topic.writer and wanted in ("", one.ident)]
+        asked = [
+            one
+            for one in network.processes
+            if one.role == topic.writer and wanted in ("", one.ident) and not network.parted(self._asker, one)
+        ]
         network.timeline.after(self._ask.timeout if asked else 0.0, self._end)
         payload = b"" if self._ask.request is None else encode(self._ask.request)
         for one in asked:
@@ -84,13 +89,15 @@ class Network:
     Attributes
     ----------
     weather : the faults that prevail now.
-    counts : how many messages were sent, lost, doubled and reordered.
+    counts : how many messages were sent, lost, doubled and reordered, or met a link that was cut.
+    cuts : each says of two processes whether their link is cut now.
     """
 
     def __init__(self, timeline: Timeline, rng: Random, weather: Weather | None = None):
         self.timeline, self.weather, self._rng = timeline, weather or Weather(), rng
         self.processes: list[Process] = []
-        self.counts = {"sent": 0, "lost": 0, "doubled": 0, "reordered": 0}
+        self.counts = {"sent": 0, "lost": 0, "doubled": 0, "reordered": 0, "cut off": 0}
+        self.cuts: list[Callable[[Process, Process], bool]] = []
         self._last: dict[tuple[str, str], float] = {}
 
     def join(self, process: Process) -> None:
@@ -107,6 +114,26 @@ class Network:
             for other in self.processes:
                 self._token(process, other, "gone")
 
+    def parted(self, one: Process, other: Process) -> bool:
+        """Whether nothing passes between the two."""
+        return any(cut(one, other) for cut in self.cuts)
+
+    def part(self, cut: Callable[[Process, Process], bool]) -> None:
+        """Cut links: each side sees the tokens of the other vanish."""
+        self._change("gone", lambda: self.cuts.append(cut))
+
+    def mend(self, cut: Callable[[Process, Process], bool]) -> None:
+        """Undo a cut: tokens come back where no other cut remains."""
+        self._change("alive", lambda: self.cuts.remove(cut))
+
+    def _change(self, what: str, change: Callable[[], None]) -> None:
+        pairs = [(one, other) for one in self.processes for other in self.processes if one is not other]
+        before = [self.parted(*pair) for pair in pairs]
+        change()
+        for (one, other), was in zip(pairs, before, strict=True):
+            if self.parted(one, other) != was:
+                self._deliver_in_order(one, other, "event", Event(what, (one.role, one.ident)))
+
     def publish(self, sender: Process, topic: str, payload: bytes) -> None:
         """To all who read the topic."""
         for one in self.processes:
@@ -121,6 +148,9 @@ class Network:
         """One message on one link: lost, doubled, overtaken, or in order."""
         weather, draw = self.weather, self._rng.random
         self.counts["sent"] += 1
+        if self.cuts and self.parted(sender, to):
+            self.counts["cut off"] += 1
+            return
         stream = kind == "message"
         if draw() < (weather.loss if stream else weather.query_loss):
             self.counts["lost"] += 1
@@ -144,4 +174,5 @@ class Network:
         self.timeline.after(self.weather.latency * 20 * self._rng.random(), to.deliver, kind, item)
 
     def _token(self, of: Process, to: Process, what: str) -> None:
-        self._deliver_in_order(of, to, "event", Event(what, (of.role, of.ident)))
+        if not self.parted(of, to):
+            self._deliver_in_order(of, to, "event", Event(what, (of.role, of.ident)))

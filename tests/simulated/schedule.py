@@ -1,27 +1,50 @@
 """A schedule: a world, a network and a list of faults. A seed makes one; taking faults away leaves a schedule."""
 
 from random import Random
-from typing import Literal, get_args
+from typing import Literal
 
 from msgspec import Struct
 
 from simulated.network import Weather
 
-Kind = Literal["kill sim", "kill agent", "kill sensors", "freeze sim", "freeze agent", "freeze sensors", "swap"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
+Theme = Literal["one agent", "standby", "real time", "begin"]
+"""one agent: one drives, and successors take over. standby: a second one stands by. real time: the clock and resets
+change the trajectory. begin: a new run is begun by request."""
+
+_PLACES = ("sim", "sensors", "agent")
+_ANYWHERE = (
+    *(f"{verb} {role}" for verb in ("kill", "freeze") for role in _PLACES),
+    "restarts sim",
+    "restarts sensors",
+    "pause",
+    "stray",
+)
+_CUTS = ("part sim sensors", "part sim agent", "part sensors agent", "part sim", "part sensors", "part agent")
+_FULL = ("full sim", "full agent")
+KINDS: dict[Theme, tuple[str, ...]] = {
+    "one agent": (*_ANYWHERE, "restarts agent", *_CUTS, *_FULL, "swap", "swap", "swap"),
+    "standby": (*_ANYWHERE, "lose driver", "lose driver", "hang driver", *_FULL),
+    "real time": (*_ANYWHERE, "restarts agent", *_CUTS, "swap", "speed", "speed", "reset", "reset"),
+    "begin": (
+        *(kind for kind in (*_ANYWHERE, *_CUTS) if kind != "kill agent"), "begin", "begin",
+    ),
+}  # fmt: skip
+"""What may happen under each theme. What a fault does stands in `faults.py`, under its first word."""
 
 
 class Fault(Struct, frozen=True):
     """Something that happens when the run has come to a tick."""
 
     tick: int
-    kind: Kind
+    kind: str
     effects: int = 0
     """kill: so many effects are still carried out."""
     tear: float | None = None
     """kill: an entry that is being written to the journal is torn at this share of its bytes."""
     seconds: float = 0.0
-    """freeze: for so long."""
+    """What lasts goes on for so long."""
+    number: int = 0
+    """restarts: so often; pause: so many single steps; speed: so many times real time; begin: the new run's seed."""
 
 
 class Schedule(Struct, kw_only=True):
@@ -33,21 +56,38 @@ class Schedule(Struct, kw_only=True):
     epochs: int
     weather: Weather
     faults: list[Fault]
+    theme: Theme = "one agent"
+    late: dict[str, float] = {}
+    """Seconds after which a role's first process starts; those that are not named start at once."""
 
 
 def make(seed: int, worlds: int = 4, epochs: int = 150) -> Schedule:
     """The schedule of a seed: up to eight faults on a network that is quiet, lossy, or worse."""
     rng = Random(seed)
+    theme: Theme = rng.choice(("one agent",) * 13 + ("standby",) * 4 + ("real time",) * 2 + ("begin",))
     weather = Weather(
         latency=10 ** rng.uniform(-4, -1.5),
         loss=rng.choice((0.0, 0.0, 0.02, 0.2)),
+        query_loss=rng.choice((0.0, 0.0, 0.0, 0.1)),
         double=rng.choice((0.0, 0.05, 0.3)),
         reorder=rng.choice((0.0, 0.05, 0.3)),
     )
-    faults = sorted((_fault(rng, epochs) for _ in range(rng.randint(0, 8))), key=lambda fault: fault.tick)
-    return Schedule(seed=seed, world=rng.randrange(worlds), epochs=epochs, weather=weather, faults=faults)
+    if theme == "standby":  # who has missed readings when the driver dies cannot know what it has learned
+        weather.loss = weather.reorder = 0.0
+    late = {role: rng.uniform(0, 1.5) for role in _PLACES if rng.random() < 0.1}
+    faults = sorted((_fault(rng, theme, epochs) for _ in range(rng.randint(0, 8))), key=lambda fault: fault.tick)
+    return Schedule(
+        seed=seed, world=rng.randrange(worlds), epochs=epochs, weather=weather, faults=faults, theme=theme, late=late
+    )
 
 
-def _fault(rng: Random, epochs: int) -> Fault:
+def _fault(rng: Random, theme: Theme, epochs: int) -> Fault:
     tear = rng.random() if rng.random() < 0.5 else None
-    return Fault(rng.randrange(epochs), rng.choice(KINDS), rng.randrange(8), tear, rng.uniform(0.01, 1.5))
+    return Fault(
+        rng.randrange(epochs),
+        rng.choice(KINDS[theme]),
+        rng.randrange(8),
+        tear,
+        rng.uniform(0.01, 1.5),
+        rng.randint(1, 6),
+    )

@@ -6,9 +6,9 @@
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from copy import deepcopy
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,15 @@ import joblib
 import msgspec
 from phototaxis.runtime.checkpoint import load
 from phototaxis.runtime.errors import UserError
+from phototaxis.runtime.seat_client import Mode
 from phototaxis.wire.messages import World
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.setup import make_setup
-from phototaxis_lab.loop import train
+from phototaxis_lab.loop import Loop, train
 from phototaxis_sim import arenas
 from tqdm import tqdm
 
+from simulated.faults import ACTS, lasts
 from simulated.process import Process
 from simulated.schedule import Fault, Schedule, make
 from simulated.system import BACK_AFTER_S, System
@@ -32,6 +34,9 @@ BEGINS_AFTER_S = 0.0005
 """Seconds after which a fault begins in its tick: some of its messages are on their way."""
 LIMIT_S = 600.0
 """Virtual seconds within which every run ends."""
+GOES_ON_WITHIN_S = 15.0
+"""Virtual seconds within which the next tick comes when all faults have ended: a seat is kept for an heir (3 s), a
+silent driver is waited for (5 s), a predecessor is asked (4 s), and lost messages are repeated."""
 
 
 @cache
@@ -53,23 +58,45 @@ def reference(world: int, epochs: int) -> tuple[str, str, int]:
     return state.hash, loop.agent.checkpoint()[0].learner_hash, state.tick
 
 
+@cache
+def reference_begun(world: int, epochs: int, begun: tuple[tuple[int, int], ...]) -> tuple[str, str]:
+    """The hashes when other runs are begun: each by its seed, after the last tick learned in the one before."""
+    arena = arenas.load("paper")
+    agent = make_setup().agent(World(run="lab", arena=arena, seed=world, epochs=epochs))
+    loop = Loop(arena, agent, world, epochs)
+    for number, (learned, seed) in enumerate(begun):
+        while loop.simulation.state.tick < learned:
+            loop.step()
+        loop.finish()
+        agent.enter(arena)
+        loop = Loop(arena, agent, seed, epochs, f"lab.{number}")
+    while not loop.simulation.finished:
+        loop.step()
+    loop.finish()
+    return loop.simulation.state.hash, agent.checkpoint()[0].learner_hash
+
+
 class Storm:
     """One schedule as it is carried out.
 
     Attributes
     ----------
-    counts : faults that happened, by kind, and the messages that were lost, doubled and reordered.
+    counts : faults that happened, by kind, and the messages that were lost, doubled, reordered and cut off.
     """
 
     def __init__(self, schedule: Schedule, folder: Path):
         self.counts: Counter[str] = Counter()
         self._schedule, self._faults = schedule, list(schedule.faults)
         arena = arenas.load("paper")
-        self._system = System(folder, schedule.seed, arena, fresh, schedule.world, schedule.epochs)
-        self._system.network.weather = msgspec.structs.replace(schedule.weather)
-        self._names = ["agent"]
-        self._sim = self._system.simulation()
-        self._sensors, self._agent = self._system.sensors(), self._system.agent("agent")
+        self.system = System(folder, schedule.seed, arena, fresh, schedule.world, schedule.epochs)
+        self.system.network.weather = msgspec.structs.replace(schedule.weather)
+        self._processes: dict[str, Process] = {}
+        """The simulation and the sensors by role, agents by name; of agents those that are started again."""
+        self._agents = 0
+        self._moved, self._calm_at = ("", 0.0), 0.0
+        for role, start in (("sim", self.system.simulation), ("sensors", self.system.sensors)):
+            self.system.timeline.after(schedule.late.get(role, 0.0), self._start, role, start)
+        self.system.timeline.after(schedule.late.get("agent", 0.0), self._join)
 
     def run(self) -> int:
         """Carry it out; the ticks of the run.
@@ -79,55 +106,114 @@ class Storm:
         Broken
             when an invariant does not hold, the run does not end, or ends otherwise than in one process.
         """
-        system, schedule = self._system, self._schedule
+        system = self.system
         system.witness.on_tick = self._begin_at
         system.timeline.after(BACK_AFTER_S, self._watch)
         if not system.finish(LIMIT_S):
             raise Broken(f"the run stands at tick {system.tick} after {LIMIT_S:g} s")
-        state_hash, learner_hash, ticks = reference(schedule.world, schedule.epochs)
-        if system.hash != state_hash:
-            raise Broken("the state's hash is another than in one process")
-        if load(system.checkpoint(system.driver or system.witness.author))[0].learner_hash != learner_hash:
-            raise Broken("what was learned is another than in one process")
+        if self._schedule.theme != "real time":
+            self._compare()
         self.counts.update({name: count for name, count in system.network.counts.items() if name != "sent"})
-        return ticks
+        return system.tick
+
+    def of(self, role: str) -> Process:
+        """The process that faults of a role befall; of agents the one that drives, else the newest."""
+        if role == "agent":
+            names = [name for name in self._processes if name.startswith("agent")]
+            return self._processes[self.system.driver if self.system.driver in names else names[-1]]
+        return self._processes[role]
+
+    def may_die(self, process: Process) -> bool:
+        """Whether it can be continued: by its journal, if it keeps one, and a driver's standby, if there is one."""
+        disk = self.system.disks.get(process.ident)
+        if disk is not None and (disk.full or not disk.kept):
+            return False
+        return process.role != "agent" or self._schedule.theme != "standby" or self.standby_is_named()
+
+    def standby_is_named(self) -> bool:
+        """Whether the simulation would seat a standby that lives, were its driver gone."""
+        steps = self.system.steps
+        others = {} if steps is None else {name: self._processes.get(name) for name in steps.seat.waiting}
+        return any(one is not None and not one.dead and one.kill_in is None for one in others.values())
+
+    def take_over(self) -> None:
+        """An agent of the same kind takes over; from now on it is the one that faults befall."""
+        del self._processes[self.of("agent").ident]
+        self._join()
+
+    def replace_driver(self) -> None:
+        """Forget an agent that has died for good; another one stands by."""
+        self._processes = {name: one for name, one in self._processes.items() if one.role != "agent" or not one.dead}
+        self._join()
+
+    @cached_property
+    def operator(self) -> Process:
+        """Who puts requests to the simulation."""
+        return self.system.operator()
+
+    def _start(self, role: str, start: Callable[[], Process]) -> None:
+        self._processes[role] = start()
+
+    def _join(self) -> None:
+        """Another agent comes."""
+        self._agents += 1
+        name = f"agent-{self._agents}"
+        self._processes[name] = self.system.agent(name, self._mode)
+        if self._schedule.theme == "standby" and self._agents == 1:
+            self._join()
+
+    @property
+    def _mode(self) -> Mode:
+        if self._schedule.theme == "standby":
+            return "stand by"
+        return "claim" if self._agents == 1 else "take over"
 
     def _watch(self) -> None:
-        """Start again what has died."""
-        system = self._system
-        if self._sim.dead:
-            self._sim = system.simulation()
-        if self._sensors.dead:
-            self._sensors = system.sensors()
-        if self._agent.dead and not system.finished:
-            mode = "claim" if len(self._names) == 1 else "take over"
-            self._agent = system.agent(self._names[-1], mode, restarted=True)
-        if not system.finished:
-            system.timeline.after(BACK_AFTER_S, self._watch)
+        """Start again what has died, and see that the run goes on."""
+        system, now = self.system, self.system.timeline.now
+        if system.finished:
+            return
+        for name, process in self._processes.items():
+            if process.dead:
+                self._processes[name] = self._again(name, process.role)
+        if self._moved[0] != system.hash:
+            self._moved = system.hash, now
+        if now - max(self._moved[1], self._calm_at) > GOES_ON_WITHIN_S:
+            raise Broken(f"nothing has happened for {GOES_ON_WITHIN_S:g} s, at tick {system.tick}")
+        system.timeline.after(BACK_AFTER_S, self._watch)
+
+    def _again(self, name: str, role: str) -> Process:
+        if role == "agent":
+            return self.system.agent(name, self._mode, restarted=True)
+        return self.system.simulation() if role == "sim" else self.system.sensors()
 
     def _begin_at(self, tick: int) -> None:
         """Begin the faults of a tick a moment after it is first asked for."""
         while self._faults and self._faults[0].tick <= tick:
-            self._system.timeline.after(BEGINS_AFTER_S, self._begin, self._faults.pop(0))
+            self.system.timeline.after(BEGINS_AFTER_S, self._begin, self._faults.pop(0))
 
     def _begin(self, fault: Fault) -> None:
         self.counts[fault.kind] += 1
-        if fault.kind == "swap":
-            agent = self._agent  # one that dies before it hands over takes what it knows with it
-            if not agent.dead and agent.kill_in is None and self._system.driver == agent.ident:
-                self._swap()
-            return
-        process = {"sim": self._sim, "sensors": self._sensors, "agent": self._agent}[fault.kind.split()[1]]
-        if fault.kind.startswith("kill"):
-            process.kill_in, process.tear = fault.effects, fault.tear
-        elif not process.dead:
-            process.frozen = True
-            self._system.timeline.after(fault.seconds, process.thaw)
+        self._calm_at = max(self._calm_at, self.system.timeline.now + lasts(fault))
+        verb, *words = fault.kind.split()
+        ACTS[verb](self, fault, *words)
 
-    def _swap(self) -> None:
-        """An agent of the same kind takes over; from now on it is the one that faults befall."""
-        self._names.append(f"agent-{len(self._names) + 1}")
-        self._agent: Process = self._system.agent(self._names[-1], "take over")
+    def _compare(self) -> None:
+        """Compare the end of the run with the same run in one process."""
+        system, schedule, learned = self.system, self._schedule, self.system.witness.learned
+        seeds = [fault.number for fault in schedule.faults if fault.kind == "begin"]
+        if schedule.theme == "begin" and len(seeds) == 1:
+            state_hash, learner_hash = reference_begun(
+                schedule.world, schedule.epochs, tuple((tick, seeds[0]) for tick in learned)
+            )
+        elif seeds:
+            return
+        else:
+            state_hash, learner_hash, _ = reference(schedule.world, schedule.epochs)
+        if system.hash != state_hash:
+            raise Broken("the state's hash is another than in one process")
+        if load(system.checkpoint(system.driver or system.witness.author))[0].learner_hash != learner_hash:
+            raise Broken("what was learned is another than in one process")
 
 
 def run(schedule: Schedule) -> tuple[str, int, Counter[str]]:

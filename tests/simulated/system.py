@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 from functools import partial
+from itertools import count
 from pathlib import Path
 from random import Random
 
 from phototaxis.geometry.arena import Arena
 from phototaxis.runtime.chunks import LogPublisher
-from phototaxis.runtime.journal import Journal
 from phototaxis.runtime.seat_client import Mode
 from phototaxis.runtime.store import Store
 from phototaxis.wire.messages import World
@@ -24,8 +24,11 @@ from phototaxis_sim.pace import Pace
 from phototaxis_sim.phases import Phase
 from phototaxis_sim.simulation import Simulation
 from phototaxis_sim.stepper import Stepper
+from phototaxis_sim.steps import Steps
 
+from simulated.disk import Disk
 from simulated.network import Network, Weather
+from simulated.operator import Operator
 from simulated.process import Process
 from simulated.sensing import RememberedChoice
 from simulated.timeline import Timeline
@@ -43,6 +46,10 @@ class System:
     folder : where the simulation and the agents keep their checkpoints and journals.
     seed : of all faults; the world has a seed of its own.
     make : makes an agent that has learned nothing.
+
+    Attributes
+    ----------
+    disks : the journal of each process that keeps one, by the process's name.
     """
 
     def __init__(
@@ -50,7 +57,10 @@ class System:
     ):
         self.timeline, self.rng, self.witness = Timeline(), Random(seed), Witness()
         self.network = Network(self.timeline, self.rng, Weather())
+        self.disks: dict[str, Disk] = {}
         self._folder, self._make, self._starts = folder, make, 0
+        self._stepper: Stepper | None = None
+        self._suffixes = count()
         self._fresh = lambda: Simulation(arena, world_seed, "run", epochs)
         self._pace = lambda: Pace(arena.motion.control_period)
 
@@ -58,34 +68,46 @@ class System:
         self._starts += 1
         return Process(self.network, role, ident or f"{role}-{self._starts}", self.witness.carried)
 
+    def _disk(self, process: Process, path: Path) -> Disk:
+        self.disks[process.ident] = disk = Disk(path)
+        return disk
+
     def simulation(self) -> Process:
         """Start the simulation, or start it again from its journal."""
-        process, journal = self._process("sim"), Journal(self._folder / "sim.journal")
+        process = self._process("sim")
+        journal = self._disk(process, self._folder / "sim.journal")
         fresh = self._fresh()
-        self._stepper = Stepper(fresh, self._pace(), lambda: "0000", open_journal(journal, fresh))
+        self._stepper = Stepper(
+            fresh, self._pace(), lambda: f"{next(self._suffixes):04x}", open_journal(journal, fresh)
+        )
         log = LogPublisher(process, "log/sim", chunks(process.ident))
         process.start(self._stepper, journal, Store(journal), log)
         return process
 
     @property
+    def steps(self) -> Steps | None:
+        """The simulation's run and seat; None before it starts."""
+        return None if self._stepper is None else self._stepper.steps
+
+    @property
     def finished(self) -> bool:
         """Whether the last tick has its answer."""
-        return self._stepper.steps.state is Phase.FINISHED
+        return self.steps is not None and self.steps.state is Phase.FINISHED
 
     @property
     def driver(self) -> str:
         """Who holds the seat."""
-        return self._stepper.steps.seat.driver
+        return "" if self.steps is None else self.steps.seat.driver
 
     @property
     def hash(self) -> str:
         """The state's hash at the present tick."""
-        return self._stepper.steps.simulation.state.hash
+        return "" if self.steps is None else self.steps.simulation.state.hash
 
     @property
     def tick(self) -> int:
-        """The present tick."""
-        return self._stepper.steps.tick
+        """The present tick; −1 before the simulation starts."""
+        return -1 if self.steps is None else self.steps.tick
 
     def sensors(self) -> Process:
         """Start the sensors."""
@@ -101,17 +123,23 @@ class System:
     def agent(self, name: str, mode: Mode = "claim", at: int = 0, restarted: bool = False) -> Process:
         """Start an agent, or start it again from what it left on disk."""
         process, path = self._process("agent", name), self.checkpoint(name)
-        journal = Journal(path.with_suffix(".journal"))
+        journal = self._disk(process, path.with_suffix(".journal"))
         found = kept.read(path if restarted else None, False, journal)
 
         def make(world):
-            return watch_learning(self._make(world))
+            return watch_learning(self._make(world), self.witness)
 
         client = AgentClient(name, make, found, True, mode, at)
         if restarted:
             self.witness.restarted(name, found)
         log = LogPublisher(process, "log/agent", AgentLogs(process.ident))
         process.start(client, journal, Store(journal, path), log)
+        return process
+
+    def operator(self) -> Process:
+        """Start somebody who puts requests to the simulation."""
+        process = self._process("observer")
+        process.start(Operator())
         return process
 
     def finish(self, limit: float) -> bool:
