@@ -138,8 +138,9 @@ class Storm:
 
     def take_over(self) -> None:
         """An agent of the same kind takes over; from now on it is the one that faults befall."""
-        del self._processes[self.of("agent").ident]
+        former = self.of("agent").ident
         self._join()
+        self._processes.pop(former, None)
 
     def replace_driver(self) -> None:
         """Forget an agent that has died for good; another one stands by."""
@@ -193,6 +194,9 @@ class Storm:
             self.system.timeline.after(BEGINS_AFTER_S, self._begin, self._faults.pop(0))
 
     def _begin(self, fault: Fault) -> None:
+        if not (self._agents and {"sim", "sensors"} <= self._processes.keys()):  # somebody is late
+            self.system.timeline.after(BACK_AFTER_S, self._begin, fault)
+            return
         self.counts[fault.kind] += 1
         self._calm_at = max(self._calm_at, self.system.timeline.now + lasts(fault))
         verb, *words = fault.kind.split()

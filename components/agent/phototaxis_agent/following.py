@@ -52,7 +52,8 @@ class Following:
         """Note the driver that the readings name; return whether it is a new leader."""
         self._named = readings.driver
         fresh = readings.driver != self.leader and readings.author == readings.driver
-        self.leader = readings.driver if fresh else self.leader
+        if fresh:
+            self.leader, self._retry_at = readings.driver, -math.inf
         return fresh
 
     def due(self, now: float) -> bool:

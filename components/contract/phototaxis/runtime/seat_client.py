@@ -16,6 +16,8 @@ SEAT, RELEASE = "seat", "release"
 ASK_EVERY_S = 0.2
 """Pause between two questions when the first one was refused or lost."""
 RELEASE_WITHIN_S = 0.5
+MATCH_WITHIN_S = 3.0
+"""A standby waits so long for a driver that it can match: one that drives, or comes back."""
 
 
 class Place(StrEnum):
@@ -112,6 +114,10 @@ class SeatClient:
         """Run and tick of the newest readings."""
         self._named: list[str] = []
         """Who was named the driver in them, the last one last."""
+        self._drove = self._apart_from = ""
+        """Whose command was applied last, and whom this client follows without being its equal."""
+        self._match_by: float | None = None
+        """When a standby stops waiting for a driver that it can match; None while one drives."""
 
     @property
     def place(self) -> Place:
@@ -178,10 +184,12 @@ class SeatClient:
         """Begin anew in another run."""
         self._place.take(Seen.RUN)
         self._known = self._has_driven = False
+        self._drove, self._match_by = "", None
 
     def learn(self, seen: Literal[Seen.APART, Seen.EQUAL, Seen.GAP]) -> None:
         """Take in how this client compares with the driver that it follows."""
         self._place.take(seen)
+        self._apart_from = self._drove if seen is Seen.APART else ""
 
     def leave(self) -> list[Effect]:
         """Give the seat back, or the place in the queue for it."""
@@ -191,6 +199,7 @@ class SeatClient:
     def _note(self, readings: Readings | BatchReadings) -> None:
         """Remember whom the readings name, after all whom the same tick has named."""
         moment, driver = (readings.run, readings.tick), readings.driver
+        self._drove = readings.author or self._drove
         if moment != self._moment:
             self._moment, self._named = moment, []
         if driver:
@@ -212,13 +221,20 @@ class SeatClient:
         if self.mode == "claim":
             wanted = not readings.driver
         else:
-            wanted = not self._known and (self.mode == "take over" or self._ready(readings))
+            wanted = not self._known and (self.mode == "take over" or self._ready(readings, now))
         return self._ask(now) if wanted and now >= self._ask_at else []
 
-    def _ready(self, readings: Readings | BatchReadings) -> bool:
-        """Whether a standby may get the seat: the driver has not driven yet, or is matched, or cannot be matched."""
-        has_driven = readings.driver != "" and readings.author == readings.driver
-        return not has_driven or self.place in (Place.SHADOWING, Place.IN_STEP)
+    def _ready(self, readings: Readings | BatchReadings, now: float) -> bool:
+        """Whether a standby may get the seat: it matches the last driver, cannot match it, or has none to match."""
+        matched = self.place is Place.IN_STEP
+        if matched or (readings.driver and readings.driver == self._apart_from):
+            return True
+        if readings.driver == self._drove != "":
+            self._match_by = None
+            return False
+        if self._match_by is None:
+            self._match_by = now + MATCH_WITHIN_S
+        return now >= self._match_by or (readings.tick == 0 and not readings.driver)
 
     def _ask(self, now: float) -> list[Effect]:
         if self._asked is not None:
