@@ -1,7 +1,54 @@
-"""`python -m simulated FIRST:LAST`, with the folder `tests` on the path."""
+"""`python -m simulated FIRST:LAST`, with the folder `tests` on the path: runs the schedules of a range of seeds.
 
+With TRACE=1 in the environment it prints what happens in each of them, line by line, and with COVERAGE=1 how often each
+transition of the machines was taken.
+"""
+
+import os
 import sys
+import time
+from collections import Counter
 
-from simulated.storm import main
+from tqdm import tqdm
 
-sys.exit(main(sys.argv[1:]))
+from simulated.runs import results, run
+from simulated.schedule import make
+from simulated.shrink import shrink, told
+from simulated.taken import table
+from simulated.trace import Trace
+
+
+def main(words: list[str]) -> int:
+    first, _, last = (words[0] if words else "0:200").partition(":")
+    seeds = range(int(first), int(last) if last else int(first) + 1)
+    if os.environ.get("TRACE"):
+        return _trace(seeds)
+    covered = bool(os.environ.get("COVERAGE"))
+    began, ticks, failed, faults, taken = time.perf_counter(), 0, 0, Counter[str](), Counter[tuple[str, str, str]]()
+    for seed, found in tqdm(results(seeds, covered), total=len(seeds), unit=" schedules"):
+        ticks, faults, taken = ticks + found.ticks, faults + found.faults, taken + found.taken
+        if found.wrong:
+            failed += 1
+            simplest = shrink(make(seed), lambda schedule: run(schedule).wrong)
+            print(f"seed {seed}: {found.wrong}; as simple as it gets:{told(simplest)}", flush=True)
+    seconds = time.perf_counter() - began
+    for line in table(taken) if covered else ():
+        print(line)
+    rate = f"{ticks / seconds:.0f} ticks/s, {len(seeds) / seconds:.1f} schedules/s"
+    print(f"{len(seeds)} schedules, {ticks} ticks, {failed} failed; {rate}")
+    print(", ".join(f"{kind}: {count}" for kind, count in sorted(faults.items())))
+    return 1 if failed else 0
+
+
+def _trace(seeds: range) -> int:
+    wrong = ""
+    for seed in seeds:
+        print(f"seed {seed}:{told(make(seed))}")
+        with Trace(print).watching():
+            wrong = run(make(seed)).wrong or wrong
+        print(wrong or "ends with the hashes of the run in one process")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

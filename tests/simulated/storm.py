@@ -1,32 +1,23 @@
-"""Runs schedules and compares each with the run in one process; a schedule that fails is made as short as it can be.
+"""Carries out one schedule on a whole system, and compares its end with the run in one process."""
 
-`make storm SEEDS=0:1000` runs a range of seeds.
-"""
-
-import tempfile
-import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from copy import deepcopy
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
 
-import joblib
 import msgspec
 from phototaxis.runtime.checkpoint import load
-from phototaxis.runtime.errors import UserError
 from phototaxis.runtime.seat_client import Mode
 from phototaxis.wire.messages import World
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.setup import make_setup
 from phototaxis_lab.loop import Loop, train
 from phototaxis_sim import arenas
-from tqdm import tqdm
 
 from simulated.faults import ACTS, lasts
 from simulated.process import Process
-from simulated.schedule import Fault, Schedule, make
+from simulated.schedule import Fault, Schedule
 from simulated.system import BACK_AFTER_S, System
 from simulated.witness import Broken
 
@@ -218,50 +209,3 @@ class Storm:
             raise Broken("the state's hash is another than in one process")
         if load(system.checkpoint(system.driver or system.witness.author))[0].learner_hash != learner_hash:
             raise Broken("what was learned is another than in one process")
-
-
-def run(schedule: Schedule) -> tuple[str, int, Counter[str]]:
-    """What is wrong ("" for nothing), the ticks, and the faults by kind.
-
-    Wrong is what breaks an invariant or is told to users as an error; any other exception is a defect of the harness.
-    """
-    with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:  # noqa: S108
-        try:
-            storm = Storm(schedule, Path(folder))
-            return "", storm.run(), storm.counts
-        except (Broken, UserError) as error:
-            return f"{type(error).__name__}: {error}", 0, Counter()
-
-
-def results(seeds: range) -> Iterator[tuple[int, tuple[str, int, Counter[str]]]]:
-    """Each seed with what `run` says of its schedule, on all cores."""
-    parallel: Any = joblib.Parallel  # its stubs know neither numbers for batch_size nor generators
-    return parallel(n_jobs=-1, batch_size=8, return_as="generator")(joblib.delayed(_numbered)(s) for s in seeds)
-
-
-def _numbered(seed: int) -> tuple[int, tuple[str, int, Counter[str]]]:
-    return seed, run(make(seed))
-
-
-def shrink(schedule: Schedule) -> Schedule:
-    """The schedule without the faults that it fails without."""
-    for fault in reversed(schedule.faults):
-        fewer = msgspec.structs.replace(schedule, faults=[one for one in schedule.faults if one is not fault])
-        if run(fewer)[0]:
-            schedule = fewer
-    return schedule
-
-
-def main(words: list[str]) -> int:
-    first, _, last = (words[0] if words else "0:200").partition(":")
-    seeds = range(int(first), int(last) if last else int(first) + 1)
-    began, ticks, failed, faults = time.perf_counter(), 0, 0, Counter[str]()
-    for seed, (wrong, made, counts) in tqdm(results(seeds), total=len(seeds), unit=" schedules"):
-        ticks, faults = ticks + made, faults + counts
-        if wrong:
-            failed += 1
-            print(f"seed {seed}: {wrong}\n  {shrink(make(seed))}", flush=True)
-    seconds = time.perf_counter() - began
-    rate = f"{ticks / seconds:.0f} ticks/s, {len(seeds) / seconds:.1f} schedules/s"
-    print(f"{len(seeds)} schedules, {ticks} ticks, {failed} failed; {rate}; {dict(sorted(faults.items()))}")
-    return 1 if failed else 0

@@ -3,8 +3,8 @@
 import pytest
 
 from simulated.mutations import MUTATIONS
+from simulated.runs import run
 from simulated.schedule import make
-from simulated.storm import run
 
 SEEDS = 200
 
@@ -13,7 +13,7 @@ SEEDS = 200
 def test_a_defect_is_caught(mutation, monkeypatch, capsys):
     monkeypatch.setattr(mutation.where, mutation.name, mutation.make(getattr(mutation.where, mutation.name)))
     for seed in range(SEEDS):
-        wrong = run(make(seed))[0]
+        wrong = run(make(seed)).wrong
         if wrong.startswith("Broken"):
             with capsys.disabled():
                 print(f"\n{mutation.about}: seed {seed}, {wrong}")
