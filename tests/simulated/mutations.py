@@ -8,13 +8,15 @@ import msgspec
 import numpy as np
 from phototaxis.runtime.journal import Journal
 from phototaxis.runtime.machine import Append
-from phototaxis.runtime.protocol import AnswerCache
+from phototaxis.runtime.protocol import AnswerCache, RetransmitTimer
+from phototaxis.runtime.seat_client import SeatClient
 from phototaxis_agent.agent import Agent
 from phototaxis_agent.client import AgentClient
 from phototaxis_agent.following import Following
 from phototaxis_agent.keeping import Keeping
 from phototaxis_agent.policy import Policy
 from phototaxis_sensors.suite import SensorSuite
+from phototaxis_sim.seat import Seat
 from phototaxis_sim.simulation import Simulation
 from phototaxis_sim.stepper import Stepper
 from phototaxis_sim.steps import Steps
@@ -117,6 +119,50 @@ def _chain_lost(right):
     return lambda self, at, *given: right(self, msgspec.structs.replace(at, chain=b"\0" * 8), *given)
 
 
+def _any_author(right):
+    def command(self, given):
+        known = {change.driver for change in self.seat.history}
+        author = self.seat.driver if given.author in known else given.author
+        right(self, msgspec.structs.replace(given, author=author))
+
+    return command
+
+
+def _granted_twice(right):
+    def claim(self, agent, tick):
+        if self.driver:
+            self.driver = ""
+        right(self, agent, tick)
+
+    return claim
+
+
+def _without_heir(right):
+    def go_on(self, found):
+        right(self, found)
+        self.seat.heir = ""
+
+    return go_on
+
+
+def _standbys_stay(right):
+    def give(self, agent, tick, how):
+        kept = [name for name in self.standbys if name != agent]
+        right(self, agent, tick, how)
+        self.standbys = kept
+
+    return give
+
+
+def _left_out(right):
+    def apply(self, entry):
+        right(self, entry)
+        if self.tick % 50 == 0 and not entry.end:
+            self._advance(entry)
+
+    return apply
+
+
 MUTATIONS = [
     Mutation("publishes before the journal", AgentClient, "_drive", _later),
     Mutation("keeps no journal of the readings", Keeping, "entry", lambda _: lambda self, readings: []),
@@ -135,4 +181,25 @@ MUTATIONS = [
     Mutation("does not make the journal's commands again", Steps, "go_on", _entries_lost),
     Mutation("begins the chain of hashes anew", Simulation, "restore", _chain_lost),
     Mutation("sensors that are asked again sense otherwise", SensorSuite, "__call__", _drifting),
+    Mutation("accepts a former driver's command", Steps, "command", _any_author),
+    Mutation(
+        "applies the command of another run", Steps, "command", _taken_for(run=lambda self: self.simulation.state.run)
+    ),
+    Mutation(
+        "applies a command that comes from anybody", Steps, "command", _taken_for(author=lambda self: self.seat.driver)
+    ),
+    Mutation("grants the seat twice", Seat, "claim", _granted_twice),
+    Mutation("drops the heir of a continued simulation", Steps, "go_on", _without_heir),
+    Mutation("never repeats a question", RetransmitTimer, "due", lambda _: lambda self, now: False),
+    Mutation("never seats a taker-over", Seat, "boundary", lambda _: lambda self, tick: False),
+    Mutation("accepts stale readings", SeatClient, "stale", lambda _: lambda self, readings: False),
+    Mutation("stands by before it is the driver's equal", SeatClient, "_ready", lambda _: lambda self, *given: True),
+    Mutation("keeps the queue of a former driver", Seat, "_give", _standbys_stay),
+    Mutation("applies a command twice", Steps, "apply", _left_out),
+    Mutation("asks a predecessor only once", Following, "again", lambda _: lambda self, now: []),
+    Mutation("keeps a seat for who has gone", Seat, "leave", lambda _: lambda self, agent, tick: False),
+    Mutation(
+        "does not replace a journal that was given up", Keeping, "write_failure", lambda _: lambda self, *given: []
+    ),
+    Mutation("forgets a pause", Stepper, "_resume", _nothing),
 ]

@@ -59,8 +59,19 @@ def test_a_standby_takes_a_free_seat_unless_it_is_kept_for_its_former_driver():
         kept.claim("c", 0)
     assert kept.driver == ""
     kept.claim("a", 0)
-    assert kept.leave("a", 1)
-    assert kept.driver == "b"
+    assert kept.waiting == []
+
+
+def test_a_new_driver_has_no_standbys_until_they_ask_again():
+    seat = Seat()
+    seat.claim("a", 0)
+    seat.stand_by("b", 1)
+    seat.stand_by("c", 1)
+    seat.leave("a", 2)
+    assert (seat.driver, seat.waiting) == ("b", [])
+    seat.stand_by("c", 2)
+    assert seat.leave("b", 3)
+    assert seat.driver == "c"
 
 
 def test_an_early_taker_over_does_not_take_a_vanished_drivers_seat():

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from making import readings
 from phototaxis.runtime.machine import Ask, Effect, Say
-from phototaxis.runtime.seat_client import ASK_EVERY_S, RELEASE, TABLE, Mode, Place, SeatClient, Seen
+from phototaxis.runtime.seat_client import ASK_EVERY_S, MATCH_WITHIN_S, RELEASE, TABLE, Mode, Place, SeatClient, Seen
 from phototaxis.runtime.transitions import diagram
 from phototaxis.wire.messages import ControlReply, Status
 
@@ -103,6 +103,11 @@ def test_who_claims_waits_for_a_driver_and_says_so_once():
 @pytest.mark.parametrize(("mode", "line"), [("take over", "takes over from tick 5 on"), ("stand by", "stands by")])
 def test_a_simulation_that_is_back_is_asked_anew(mode: Mode, line):
     client = SeatClient("me", mode, at=5)
+    client.see(readings(driver="a", author="a"), -1.0)
+    if mode == "stand by":
+        client.learn(Seen.EQUAL)
+    else:
+        client.answered(None)
     for now in (0.0, 1.0):
         (request,) = requests(client.see(readings(driver="a"), now))
         assert (request.verb, request.agent, request.at) == (mode, "me", 5)
@@ -152,26 +157,47 @@ def test_a_simulation_that_is_back_may_seat_anybody_in_the_same_tick():
     assert not client.stale(readings(5, driver="a"))
 
 
-def test_a_standby_that_lost_the_seat_stands_by_again():
+def test_a_standby_that_lost_the_seat_waits_to_be_the_drivers_equal_again():
     client = SeatClient("me", "stand by")
     client.see(readings(driver="me"), 0.0)
-    assert asked(client.see(readings(1, driver="b", author="me"), 1.0)) == ["stand by"]
+    assert asked(client.see(readings(1, driver="b", author="me"), 1.0)) == []
     client.see(readings(2, driver="b", author="b"), 2.0)
     assert client.place is Place.QUEUED
+    client.learn(Seen.EQUAL)
+    assert asked(client.see(readings(3, driver="b", author="b"), 3.0)) == ["stand by"]
 
 
-@pytest.mark.parametrize("seen", [Seen.EQUAL, Seen.APART])
-def test_a_standby_queues_once_it_knows_what_the_driver_knows_or_that_it_cannot(seen):
+@pytest.mark.parametrize(("seen", "for_good"), [(Seen.EQUAL, False), (Seen.APART, True)])
+def test_a_standby_queues_once_it_knows_what_the_driver_knows_or_that_it_never_will(seen, for_good):
     client = SeatClient("me", "stand by")
     for now in (0.0, 1.0):
         assert client.see(readings(driver="a", author="a"), now) == [], "a seat it is given now is a state that is lost"
-    client.learn(seen)
+    client.learn(seen, for_good)
     assert asked(client.see(readings(1, driver="a", author="a"), 2.0)) == ["stand by"]
 
 
-def test_a_standby_sits_down_where_there_is_nothing_to_inherit():
-    for driver, author in (("", ""), ("a", ""), ("a", "b"), ("", "a")):
-        assert asked(SeatClient("me", "stand by").see(readings(1, driver=driver, author=author), 0.0)) == ["stand by"]
+@pytest.mark.parametrize(("driver", "author"), [("a", "a"), ("a", "b"), ("a", ""), ("", "a")])
+def test_a_standby_that_cannot_match_a_driver_in_time_takes_the_seat_as_it_is(driver, author):
+    client = SeatClient("me", "stand by")
+    client.see(readings(1, driver=driver, author=author), 0.0)
+    assert client.see(readings(1, driver=driver, author=author), MATCH_WITHIN_S - 0.1) == []
+    late = client.see(readings(1, driver=driver, author=author), MATCH_WITHIN_S)
+    assert asked(late) == ["stand by" if driver else "claim"]
+
+
+def test_a_standby_is_apart_from_one_driver_and_not_from_the_next():
+    client = SeatClient("me", "stand by")
+    client.see(readings(1, driver="a", author="a"), 0.0)
+    client.learn(Seen.APART, for_good=True)
+    client.see(readings(2, driver="a", author="a"), 1.0)
+    client.answered(reply(True))
+    assert client.see(readings(3, driver="b", author="a"), 2.0) == []
+    client.learn(Seen.EQUAL)
+    assert asked(client.see(readings(4, driver="b", author="b"), 3.0)) == ["stand by"], "the queue is the new driver's"
+
+
+def test_a_standby_claims_a_seat_that_nobody_has_had():
+    assert asked(SeatClient("me", "stand by").see(readings(), 0.0)) == ["claim"]
 
 
 def test_in_another_run_it_is_no_successors_predecessor():

@@ -214,7 +214,9 @@ class AgentClient:
             session.resume()
             effects += self._keeping.save(session.agent, now)
         if not driving and outcome != "same kind":
-            self.seat.learn(Seen.EQUAL if outcome == "inherited" else Seen.APART)
+            self.seat.learn(
+                Seen.EQUAL if outcome == "inherited" else Seen.APART, for_good=session.following.related is False
+            )
         return [*effects, *self._go_on(now)]
 
     def _meet(self, world: World | None, now: float) -> list[Effect]:

@@ -18,7 +18,8 @@ class Seat:
     Attributes
     ----------
     driver : who holds the seat; "" for nobody.
-    standbys : who takes it when the driver vanishes, in this order.
+    standbys : who takes it when the driver vanishes, in this order. A new driver has none: who stood by the one
+        before may not know what this one knows, and asks again.
     reserved : who takes it over, and from which tick on.
     history : who held it since when, the newest last.
     """
@@ -111,8 +112,7 @@ class Seat:
 
     def _give(self, agent: str, tick: int, how: SeatChangeReason) -> None:
         self.reserved.pop(agent, None)
-        if agent in self.standbys:
-            self.standbys.remove(agent)
+        self.standbys.clear()
         self.driver, self.heir = agent, ""
         self.history = [*self.history, SeatChange(driver=agent, tick=tick, how=how)][-MAX_HISTORY:]
 

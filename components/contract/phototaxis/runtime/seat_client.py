@@ -16,8 +16,8 @@ SEAT, RELEASE = "seat", "release"
 ASK_EVERY_S = 0.2
 """Pause between two questions when the first one was refused or lost."""
 RELEASE_WITHIN_S = 0.5
-MATCH_WITHIN_S = 3.0
-"""A standby waits so long for a driver that it can match: one that drives, or comes back."""
+MATCH_WITHIN_S = 5.0
+"""A standby gets so long to become the equal of a driver, or of one that comes back; then it takes the seat as it is."""
 
 
 class Place(StrEnum):
@@ -114,10 +114,10 @@ class SeatClient:
         """Run and tick of the newest readings."""
         self._named: list[str] = []
         """Who was named the driver in them, the last one last."""
-        self._drove = self._apart_from = ""
-        """Whose command was applied last, and whom this client follows without being its equal."""
-        self._match_by: float | None = None
-        """When a standby stops waiting for a driver that it can match; None while one drives."""
+        self._driver: str | None = None
+        """Whom the newest readings name; None before there are any."""
+        self._match_by = math.inf
+        """Until when a standby waits to become the equal of that driver; −infinity when it cannot."""
 
     @property
     def place(self) -> Place:
@@ -129,7 +129,7 @@ class SeatClient:
         if self.stale(readings):
             return []
         before, driver = self.place, readings.driver
-        self._note(readings)
+        self._note(readings, now)
         after = self._place.take(self._meaning(readings))
         if after is Place.DRIVING:
             if before is not Place.DRIVING:
@@ -159,7 +159,7 @@ class SeatClient:
         """Seek the seat in this way from now on, and ask at once."""
         self.mode, self._known, self._ask_at = mode, False, -math.inf
         self._place.take(Seen.WANTED)
-        return self._ask(now)
+        return self._ask(now, mode)
 
     def answered(self, reply: ControlReply | None) -> list[Effect]:
         """What the simulation said to the last question; None when it did not answer."""
@@ -184,22 +184,24 @@ class SeatClient:
         """Begin anew in another run."""
         self._place.take(Seen.RUN)
         self._known = self._has_driven = False
-        self._drove, self._match_by = "", None
+        self._driver = None
 
-    def learn(self, seen: Literal[Seen.APART, Seen.EQUAL, Seen.GAP]) -> None:
-        """Take in how this client compares with the driver that it follows."""
+    def learn(self, seen: Literal[Seen.APART, Seen.EQUAL, Seen.GAP], for_good: bool = False) -> None:
+        """Take in how this client compares with the driver that it follows; `for_good`: and always will."""
+        self._match_by = -math.inf if for_good else self._match_by
         self._place.take(seen)
-        self._apart_from = self._drove if seen is Seen.APART else ""
 
     def leave(self) -> list[Effect]:
         """Give the seat back, or the place in the queue for it."""
         self._place.take(Seen.LEFT)
         return [Ask(RELEASE, "control", Control(verb="release", agent=self.ident), RELEASE_WITHIN_S)]
 
-    def _note(self, readings: Readings | BatchReadings) -> None:
+    def _note(self, readings: Readings | BatchReadings, now: float) -> None:
         """Remember whom the readings name, after all whom the same tick has named."""
         moment, driver = (readings.run, readings.tick), readings.driver
-        self._drove = readings.author or self._drove
+        if driver != self._driver:
+            self._driver, self._match_by = driver, now + MATCH_WITHIN_S
+            self._known = self._known and self.mode != "stand by"
         if moment != self._moment:
             self._moment, self._named = moment, []
         if driver:
@@ -217,27 +219,24 @@ class SeatClient:
         return Seen.TAKEN
 
     def _seek(self, readings: Readings | BatchReadings, now: float) -> list[Effect]:
-        """Ask where the mode wants it: a claim while nobody drives, everything else until the simulation knows."""
+        """Ask where the mode wants it: a claim while nobody drives, everything else until the simulation knows.
+
+        A standby claims a free seat, too: if it came late, it would be in the queue without being the driver's equal.
+        """
+        verb: Mode = "claim" if self.mode == "stand by" and not readings.driver else self.mode
         if self.mode == "claim":
             wanted = not readings.driver
         else:
             wanted = not self._known and (self.mode == "take over" or self._ready(readings, now))
-        return self._ask(now) if wanted and now >= self._ask_at else []
+        return self._ask(now, verb) if wanted and now >= self._ask_at else []
 
     def _ready(self, readings: Readings | BatchReadings, now: float) -> bool:
-        """Whether a standby may get the seat: it matches the last driver, cannot match it, or has none to match."""
-        matched = self.place is Place.IN_STEP
-        if matched or (readings.driver and readings.driver == self._apart_from):
-            return True
-        if readings.driver == self._drove != "":
-            self._match_by = None
-            return False
-        if self._match_by is None:
-            self._match_by = now + MATCH_WITHIN_S
-        return now >= self._match_by or (readings.tick == 0 and not readings.driver)
+        """Whether a standby may get the seat: as an equal, or where there is nothing to inherit, or not in time."""
+        untouched = readings.tick == 0 and not readings.driver
+        return self.place is Place.IN_STEP or untouched or now >= self._match_by
 
-    def _ask(self, now: float) -> list[Effect]:
+    def _ask(self, now: float, verb: Mode) -> list[Effect]:
         if self._asked is not None:
             return []
-        self._asked, self._ask_at = self.mode, now + ASK_EVERY_S
-        return [Ask(SEAT, "control", Control(verb=self.mode, agent=self.ident, at=self._at))]
+        self._asked, self._ask_at = verb, now + ASK_EVERY_S
+        return [Ask(SEAT, "control", Control(verb=verb, agent=self.ident, at=self._at))]
