@@ -10,20 +10,13 @@ from typing import Any
 import msgspec
 from phototaxis.runtime.machine import Answer, Ask, Event
 from phototaxis.runtime.roles import ROLES
-from phototaxis.wire.codec import Decoder, Refused, encode
-from phototaxis.wire.messages import LogRequest, Message
+from phototaxis.wire.codec import Refused, encode
+from phototaxis.wire.messages import Message
 from phototaxis.wire.topics import TOPICS
 
+from simulated.decoders import ANSWERS
 from simulated.process import Process
 from simulated.timeline import Timeline
-
-DECODERS = {topic.name: Decoder(topic.message, topic.limit) for topic in TOPICS.values()}
-ANSWERS = {t.name: Decoder(t.reply, t.reply_limit) if t.reply else DECODERS[t.name] for t in TOPICS.values()}
-REQUESTS: dict[str, Decoder[Any]] = {
-    topic.name: DECODERS[topic.name] if topic.kind == "query" else Decoder(LogRequest, topic.limit)
-    for topic in TOPICS.values()
-    if topic.kind in ("query", "log")
-}
 
 
 class Weather(msgspec.Struct, kw_only=True):

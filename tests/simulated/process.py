@@ -14,6 +14,8 @@ from phototaxis.runtime.store import Store
 from phototaxis.wire.codec import Refused, encode
 from phototaxis.wire.messages import Message
 
+from simulated.decoders import DECODERS, REQUESTS
+
 if TYPE_CHECKING:
     from simulated.network import Network
 
@@ -109,8 +111,6 @@ class Process:
                 self._turn(event)
 
     def _decoded(self, kind: str, item: Any) -> m.Event | None:
-        from simulated.network import DECODERS, REQUESTS
-
         if kind == "event":
             return item
         if kind == "reply":

@@ -11,6 +11,8 @@ Theme = Literal["one agent", "standby", "real time", "begin"]
 """one agent: one drives, and successors take over. standby: a second one stands by. real time: the clock and resets
 change the trajectory. begin: a new run is begun by request."""
 
+SHARES: dict[Theme, int] = {"one agent": 13, "standby": 4, "real time": 2, "begin": 1}
+"""How many of twenty schedules have which theme."""
 _PLACES = ("sim", "sensors", "agent")
 _ANYWHERE = (
     *(f"{verb} {role}" for verb in ("kill", "freeze") for role in _PLACES),
@@ -64,7 +66,7 @@ class Schedule(Struct, kw_only=True):
 def make(seed: int, worlds: int = 4, epochs: int = 150) -> Schedule:
     """The schedule of a seed: up to eight faults on a network that is quiet, lossy, or worse."""
     rng = Random(seed)
-    theme: Theme = rng.choice(("one agent",) * 13 + ("standby",) * 4 + ("real time",) * 2 + ("begin",))
+    theme = rng.choice([theme for theme, share in SHARES.items() for _ in range(share)])
     weather = Weather(
         latency=10 ** rng.uniform(-4, -1.5),
         loss=rng.choice((0.0, 0.0, 0.02, 0.2)),
