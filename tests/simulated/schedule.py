@@ -66,7 +66,7 @@ class Schedule(Struct, kw_only=True):
 def make(seed: int, worlds: int = 4, epochs: int = 150) -> Schedule:
     """The schedule of a seed: up to eight faults on a network that is quiet, lossy, or worse."""
     rng = Random(seed)
-    theme = rng.choice([theme for theme, share in SHARES.items() for _ in range(share)])
+    theme: Theme = rng.choice([theme for theme, share in SHARES.items() for _ in range(share)])
     weather = Weather(
         latency=10 ** rng.uniform(-4, -1.5),
         loss=rng.choice((0.0, 0.0, 0.02, 0.2)),
