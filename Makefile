@@ -37,7 +37,7 @@ check: setup ## style, types
 bench: setup ## measure rates and costs on this machine
 	@$(BIN)/python benchmarks/run.py
 
-storm: setup ## schedules of faults on a simulated network, SEEDS=FIRST:LAST; TRACE=1 prints what happens, COVERAGE=1 counts transitions
+storm: setup ## schedules of faults on a simulated network, SEEDS=FIRST:LAST EPOCHS=N; TRACE=1 prints what happens, COVERAGE=1 counts transitions
 	@PYTHONPATH=tests $(BIN)/python -m simulated $(SEEDS)
 
 picture: setup ## the README's picture and animation, from a real run

@@ -1,6 +1,6 @@
 """`python -m simulated FIRST:LAST`, with the folder `tests` on the path: runs the schedules of a range of seeds.
 
-With TRACE=1 in the environment it prints what happens in each of them, line by line, and with COVERAGE=1 how often each
+EPOCHS=N in the environment makes longer runs. With TRACE=1 it prints what happens in each of them, line by line, and with COVERAGE=1 how often each
 transition of the machines was taken.
 """
 
@@ -12,7 +12,7 @@ from collections import Counter
 from tqdm import tqdm
 
 from simulated.runs import results, run
-from simulated.schedule import make
+from simulated.schedule import EPOCHS, make
 from simulated.shrink import shrink, told
 from simulated.taken import table
 from simulated.trace import Trace
@@ -21,15 +21,16 @@ from simulated.trace import Trace
 def main(words: list[str]) -> int:
     first, _, last = (words[0] if words else "0:200").partition(":")
     seeds = range(int(first), int(last) if last else int(first) + 1)
+    epochs = int(os.environ.get("EPOCHS", EPOCHS))
     if os.environ.get("TRACE"):
-        return _trace(seeds)
+        return _trace(seeds, epochs)
     covered = bool(os.environ.get("COVERAGE"))
     began, ticks, failed, faults, taken = time.perf_counter(), 0, 0, Counter[str](), Counter[tuple[str, str, str]]()
-    for seed, found in tqdm(results(seeds, covered), total=len(seeds), unit=" schedules"):
+    for seed, found in tqdm(results(seeds, epochs, covered), total=len(seeds), unit=" schedules"):
         ticks, faults, taken = ticks + found.ticks, faults + found.faults, taken + found.taken
         if found.wrong:
             failed += 1
-            simplest = shrink(make(seed), lambda schedule: run(schedule).wrong)
+            simplest = shrink(make(seed, epochs), lambda schedule: run(schedule).wrong)
             print(f"seed {seed}: {found.wrong}; as simple as it gets:{told(simplest)}", flush=True)
     seconds = time.perf_counter() - began
     for line in table(taken) if covered else ():
@@ -40,12 +41,13 @@ def main(words: list[str]) -> int:
     return 1 if failed else 0
 
 
-def _trace(seeds: range) -> int:
+def _trace(seeds: range, epochs: int) -> int:
     wrong = ""
     for seed in seeds:
-        print(f"seed {seed}:{told(make(seed))}")
+        schedule = make(seed, epochs)
+        print(f"seed {seed}:{told(schedule)}")
         with Trace(print).watching():
-            wrong = run(make(seed)).wrong or wrong
+            wrong = run(schedule).wrong or wrong
         print(wrong or "ends with the hashes of the run in one process")
     return 1 if wrong else 0
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import joblib
 from phototaxis.runtime.errors import UserError
 
-from simulated.schedule import Schedule, make
+from simulated.schedule import EPOCHS, Schedule, make
 from simulated.storm import Storm
 from simulated.taken import counting
 from simulated.witness import Broken
@@ -45,13 +45,13 @@ def run(schedule: Schedule, covered: bool = False) -> Found:
             return Found(f"{type(error).__name__}: {error}", 0, Counter(), taken)
 
 
-def results(seeds: range, covered: bool = False) -> Iterator[tuple[int, Found]]:
-    """Each seed with what becomes of its schedule, on all cores."""
+def results(seeds: range, epochs: int = EPOCHS, covered: bool = False) -> Iterator[tuple[int, Found]]:
+    """Each seed with what becomes of its schedule of so many epochs, on all cores."""
     parallel: Any = joblib.Parallel  # its stubs know neither numbers for batch_size nor generators
     return parallel(n_jobs=-1, batch_size=8, return_as="generator")(
-        joblib.delayed(_numbered)(seed, covered) for seed in seeds
+        joblib.delayed(_numbered)(seed, epochs, covered) for seed in seeds
     )
 
 
-def _numbered(seed: int, covered: bool) -> tuple[int, Found]:
-    return seed, run(make(seed), covered)
+def _numbered(seed: int, epochs: int, covered: bool) -> tuple[int, Found]:
+    return seed, run(make(seed, epochs), covered)

@@ -34,6 +34,12 @@ KINDS: dict[Theme, tuple[str, ...]] = {
 """What may happen under each theme. What a fault does stands in `faults.py`, under its first word."""
 
 
+EPOCHS = 150
+"""Of a run, where nothing else is said."""
+WORLDS = 4
+"""Seeds of worlds: what a world's run in one process ends with is computed once."""
+
+
 class Fault(Struct, frozen=True):
     """Something that happens when the run has come to a tick."""
 
@@ -63,8 +69,8 @@ class Schedule(Struct, kw_only=True):
     """Seconds after which a role's first process starts; those that are not named start at once."""
 
 
-def make(seed: int, worlds: int = 4, epochs: int = 150) -> Schedule:
-    """The schedule of a seed: up to eight faults on a network that is quiet, lossy, or worse."""
+def make(seed: int, epochs: int = EPOCHS) -> Schedule:
+    """The schedule of a seed, for a run of so many epochs: up to eight faults on a network that is quiet, lossy, or worse."""
     rng = Random(seed)
     theme: Theme = rng.choice([theme for theme, share in SHARES.items() for _ in range(share)])
     weather = Weather(
@@ -79,7 +85,7 @@ def make(seed: int, worlds: int = 4, epochs: int = 150) -> Schedule:
     late = {role: rng.uniform(0, 1.5) for role in _PLACES if rng.random() < 0.1}
     faults = sorted((_fault(rng, theme, epochs) for _ in range(rng.randint(0, 8))), key=lambda fault: fault.tick)
     return Schedule(
-        seed=seed, world=rng.randrange(worlds), epochs=epochs, weather=weather, faults=faults, theme=theme, late=late
+        seed=seed, world=rng.randrange(WORLDS), epochs=epochs, weather=weather, faults=faults, theme=theme, late=late
     )
 
 
