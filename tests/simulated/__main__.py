@@ -1,7 +1,7 @@
 """`python -m simulated FIRST:LAST`, with the folder `tests` on the path: runs the schedules of a range of seeds.
 
-EPOCHS=N in the environment makes longer runs. With TRACE=1 it prints what happens in each of them, line by line, and with COVERAGE=1 how often each
-transition of the machines was taken.
+Variables of the environment: EPOCHS=N makes longer runs, TRACE=1 prints line by line what happens in each of them, and
+COVERAGE=1 prints how often each transition of the machines was taken.
 """
 
 import os

@@ -70,7 +70,7 @@ class Schedule(Struct, kw_only=True):
 
 
 def make(seed: int, epochs: int = EPOCHS) -> Schedule:
-    """The schedule of a seed, for a run of so many epochs: up to eight faults on a network that is quiet, lossy, or worse."""
+    """The schedule of a seed for a run of `epochs`: up to eight faults on a network that is quiet, lossy, or worse."""
     rng = Random(seed)
     theme: Theme = rng.choice([theme for theme, share in SHARES.items() for _ in range(share)])
     weather = Weather(
