@@ -136,15 +136,6 @@ def _never_due(right):
     return due
 
 
-def _standbys_stay(right):
-    def give(self, agent, tick, how):
-        kept = [name for name in self.standbys if name != agent]
-        right(self, agent, tick, how)
-        self.standbys = kept
-
-    return give
-
-
 def _left_out(right):
     def apply(self, entry):
         right(self, entry)
@@ -183,7 +174,6 @@ MUTATIONS = [
     Mutation("never seats a taker-over", Seat, "boundary", lambda _: lambda self, tick: False),
     Mutation("accepts stale readings", SeatClient, "stale", lambda _: lambda self, readings: False),
     Mutation("stands by before it is the driver's equal", SeatClient, "_ready", lambda _: lambda self, *given: True),
-    Mutation("keeps the queue of a former driver", Seat, "_give", _standbys_stay),
     Mutation("applies a command twice", Steps, "apply", _left_out),
     Mutation("asks a predecessor only once", Following, "again", lambda _: lambda self, now: []),
     Mutation("keeps a seat for who has gone", Seat, "leave", lambda _: lambda self, agent, tick: False),
