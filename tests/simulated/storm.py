@@ -38,6 +38,8 @@ LIMIT_S = 600.0
 GOES_ON_WITHIN_S = 15.0
 """Virtual seconds within which the next tick comes when all faults have ended: a seat is kept for an heir (3 s), a
 silent driver is waited for (5 s), a predecessor is asked (4 s), and lost messages are repeated."""
+QUESTIONS_WITHIN_S = 60.0
+"""So much longer it may take where queries are lost, too: each is put again after 2 s, up to four one after the other."""
 
 
 @cache
@@ -183,8 +185,9 @@ class Storm:
         self._see_reserved()
         if self._moved[0] != system.hash:
             self._moved = system.hash, now
-        if now - max(self._moved[1], self._calm_at) > GOES_ON_WITHIN_S:
-            raise Broken(f"nothing has happened for {GOES_ON_WITHIN_S:g} s, at tick {system.tick}")
+        within = GOES_ON_WITHIN_S + (QUESTIONS_WITHIN_S if self._schedule.weather.query_loss else 0.0)
+        if now - max(self._moved[1], self._calm_at) > within:
+            raise Broken(f"nothing has happened for {within:g} s, at tick {system.tick}")
         system.timeline.after(BACK_AFTER_S, self._watch)
 
     def _see_reserved(self) -> None:
