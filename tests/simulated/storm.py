@@ -39,7 +39,7 @@ GOES_ON_WITHIN_S = 15.0
 """Virtual seconds within which the next tick comes when all faults have ended: a seat is kept for an heir (3 s), a
 silent driver is waited for (5 s), a predecessor is asked (4 s), and lost messages are repeated."""
 QUESTIONS_WITHIN_S = 60.0
-"""So much longer it may take where queries are lost, too: each is put again after 2 s, up to four one after the other."""
+"""So much longer it may take where queries are lost, too: each of some four is put again after 2 s."""
 
 
 @cache
