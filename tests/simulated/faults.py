@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 HANGS_FOR_S = 7.0
 """So long a driver hangs: it loses the seat before."""
+LOOKS_EVERY_S = 0.001
+"""Seconds after which it is looked again whether a standby is named."""
 
 
 def kill(storm: Storm, fault: Fault, role: str) -> None:
@@ -48,10 +50,13 @@ def hang(storm: Storm, fault: Fault, role: str) -> None:
 
 
 def lose(storm: Storm, fault: Fault, role: str) -> None:
-    """The driver dies for good; another agent comes and stands by."""
+    """The driver dies for good as soon as the simulation names a standby; another agent comes and stands by."""
     if storm.may_die(storm.of("agent")):
         storm.of("agent").kill()
         storm.replace_driver()
+    elif fault.seconds > 0:
+        later = replace(fault, seconds=fault.seconds - LOOKS_EVERY_S)
+        storm.system.timeline.after(LOOKS_EVERY_S, lose, storm, later, role)
 
 
 def swap(storm: Storm, fault: Fault) -> None:

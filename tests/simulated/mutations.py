@@ -128,30 +128,12 @@ def _any_author(right):
     return command
 
 
-def _granted_twice(right):
-    def claim(self, agent, tick):
-        if self.driver:
-            self.driver = ""
-        right(self, agent, tick)
+def _never_due(right):
+    def due(self, now):
+        self.repeat_at = float("inf")
+        return False
 
-    return claim
-
-
-def _without_heir(right):
-    def go_on(self, found):
-        right(self, found)
-        self.seat.heir = ""
-
-    return go_on
-
-
-def _standbys_stay(right):
-    def give(self, agent, tick, how):
-        kept = [name for name in self.standbys if name != agent]
-        right(self, agent, tick, how)
-        self.standbys = kept
-
-    return give
+    return due
 
 
 def _left_out(right):
@@ -188,13 +170,10 @@ MUTATIONS = [
     Mutation(
         "applies a command that comes from anybody", Steps, "command", _taken_for(author=lambda self: self.seat.driver)
     ),
-    Mutation("grants the seat twice", Seat, "claim", _granted_twice),
-    Mutation("drops the heir of a continued simulation", Steps, "go_on", _without_heir),
-    Mutation("never repeats a question", RetransmitTimer, "due", lambda _: lambda self, now: False),
+    Mutation("never repeats a question", RetransmitTimer, "due", _never_due),
     Mutation("never seats a taker-over", Seat, "boundary", lambda _: lambda self, tick: False),
     Mutation("accepts stale readings", SeatClient, "stale", lambda _: lambda self, readings: False),
     Mutation("stands by before it is the driver's equal", SeatClient, "_ready", lambda _: lambda self, *given: True),
-    Mutation("keeps the queue of a former driver", Seat, "_give", _standbys_stay),
     Mutation("applies a command twice", Steps, "apply", _left_out),
     Mutation("asks a predecessor only once", Following, "again", lambda _: lambda self, now: []),
     Mutation("keeps a seat for who has gone", Seat, "leave", lambda _: lambda self, agent, tick: False),

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable
 from copy import deepcopy
 from functools import cache, cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import msgspec
@@ -28,6 +29,8 @@ LIMIT_S = 600.0
 GOES_ON_WITHIN_S = 15.0
 """Virtual seconds within which the next tick comes when all faults have ended: a seat is kept for an heir (3 s), a
 silent driver is waited for (5 s), a predecessor is asked (4 s), and lost messages are repeated."""
+QUESTIONS_WITHIN_S = 60.0
+"""So much longer it may take where queries are lost, too: each of some four is put again after 2 s."""
 
 
 @cache
@@ -84,6 +87,8 @@ class Storm:
         self._processes: dict[str, Process] = {}
         """The simulation and the sensors by role, agents by name; of agents those that are started again."""
         self._agents = 0
+        self._reserved: dict[tuple[str, int], list[int]] = {}
+        """At which ticks an agent was seen to have reserved a simulation's seat."""
         self._moved, self._calm_at = ("", 0.0), 0.0
         for role, start in (("sim", self.system.simulation), ("sensors", self.system.sensors)):
             self.system.timeline.after(schedule.late.get(role, 0.0), self._start, role, start)
@@ -168,11 +173,23 @@ class Storm:
         for name, process in self._processes.items():
             if process.dead:
                 self._processes[name] = self._again(name, process.role)
+        self._see_reserved()
         if self._moved[0] != system.hash:
             self._moved = system.hash, now
-        if now - max(self._moved[1], self._calm_at) > GOES_ON_WITHIN_S:
-            raise Broken(f"nothing has happened for {GOES_ON_WITHIN_S:g} s, at tick {system.tick}")
+        within = GOES_ON_WITHIN_S + (QUESTIONS_WITHIN_S if self._schedule.weather.query_loss else 0.0)
+        if now - max(self._moved[1], self._calm_at) > within:
+            raise Broken(f"nothing has happened for {within:g} s, at tick {system.tick}")
         system.timeline.after(BACK_AFTER_S, self._watch)
+
+    def _see_reserved(self) -> None:
+        """See that who takes over is seated at a tick's boundary; one that asks again asks less often than we look."""
+        steps, before = self.system.steps, self._reserved
+        if steps is not None:
+            waits = {(agent, id(steps.seat)): before.get((agent, id(steps.seat)), []) for agent in steps.seat.reserved}
+            self._reserved = {who: [*ticks, steps.tick] for who, ticks in waits.items()}
+            for (agent, _), ticks in self._reserved.items():
+                if len(ticks) > 3 and all(b > a + 1 for a, b in pairwise(ticks[-4:])):
+                    raise Broken(f"{agent} is not seated although ticks go by")
 
     def _again(self, name: str, role: str) -> Process:
         if role == "agent":

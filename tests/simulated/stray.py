@@ -44,12 +44,18 @@ class Stray:
 
     def _of_another_run(self) -> tuple[str, State | Readings | Command | None]:
         topic = self._rng.choice(("state", "readings", "command"))
-        heard = self._witness.published[topic]
-        return topic, replace(self._rng.choice(heard), run="elsewhere") if heard else None
+        heard = self._witness.published[topic if topic != "command" else "state"]
+        if topic == "command" and heard:
+            return topic, self._forged("elsewhere", heard[-1].driver)
+        return topic, replace(heard[-1], run="elsewhere") if heard else None
 
     def _of_another_author(self) -> tuple[str, Command | None]:
-        """A command for the newest tick."""
+        """A command of a stranger, or of a former driver that is gone, for the newest tick."""
         heard = self._witness.published["state"]
-        if not heard:
-            return "command", None
-        return "command", Command(run=heard[-1].run, tick=heard[-1].tick, author="stray", left=1.0, right=-1.0)
+        here = {process.ident for process in self._network.processes}
+        gone = {one.author for one in self._witness.published["command"]} - here - {one.driver for one in heard[-1:]}
+        return "command", self._forged(heard[-1].run, self._rng.choice(["stray", *sorted(gone)])) if heard else None
+
+    def _forged(self, run: str, author: str) -> Command:
+        newest = self._witness.published["state"][-1]
+        return Command(run=run, tick=newest.tick, author=author, left=1.0, right=-1.0)

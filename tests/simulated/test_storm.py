@@ -1,7 +1,8 @@
 """The whole system on the simulated network: whatever a schedule does, the run is the one in one process."""
 
+from simulated.faults import ACTS
 from simulated.runs import results, run
-from simulated.schedule import make
+from simulated.schedule import KINDS, make
 from simulated.shrink import shrink, told
 from simulated.timeline import Timeline
 
@@ -28,8 +29,15 @@ def test_a_successor_inherits_although_a_question_is_lost():
 
 
 def test_a_seed_is_a_schedule():
-    assert make(5) == make(5)
-    assert run(make(5)) == run(make(5))
+    themes = {make(seed).theme: seed for seed in range(60)}
+    assert themes.keys() == KINDS.keys()
+    for seed in themes.values():
+        assert make(seed) == make(seed)
+        assert run(make(seed)) == run(make(seed))
+
+
+def test_every_kind_of_fault_has_an_act():
+    assert {kind.split()[0] for kinds in KINDS.values() for kind in kinds} == ACTS.keys()
 
 
 def test_time_jumps_from_one_event_to_the_next_in_order():
