@@ -39,7 +39,7 @@ def test_the_result_is_of_whoever_drove_last(start, up, world, tmp_path):
     launcher = up("--epochs", 0, "--seed", 7, "--no-recorder")
     with observer(world) as bus:
         wait_status(bus, lambda status: status.tick > 10, launcher)
-        start("agent", "--name", world, "--take-over", "--checkpoint", tmp_path / "theirs.npz", "--id", "theirs")
+        start("agent", "--name", world, "--take-over", "--checkpoint", tmp_path / "theirs.npz", "--label", "theirs")
         wait_status(bus, lambda status: "theirs" in status.driver, launcher)
     launcher.popen.terminate()
     found = result(launcher)

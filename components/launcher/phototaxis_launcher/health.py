@@ -21,8 +21,8 @@ class Options(BusOptions, kw_only=True):
 
     role: str
     """router: the bus can be entered; sim: its token is there, and it answers; another component: its token is there"""
-    id: str = ""
-    """the component's own --id (default: any component of that role)"""
+    label: str = ""
+    """the component's own --label (default: any component of that role)"""
 
 
 def main(argv: Sequence[str]) -> int:
@@ -38,9 +38,9 @@ def main(argv: Sequence[str]) -> int:
                 event = bus.receive(timeout=left)
                 if event is None or event.topic != "alive" or event.message[0] != options.role:
                     continue
-                if options.id and f"-{options.id}-" not in event.message[1]:
+                if options.label and f"-{options.label}-" not in event.message[1]:
                     continue
                 if options.role != "sim" or bus.control(Control(verb="status")) is not None:
                     return 0
-    who = f"{options.role} {options.id}".rstrip()
+    who = f"{options.role} {options.label}".rstrip()
     raise Unavailable(f"no {who} answers on the bus of '{options.name}'")

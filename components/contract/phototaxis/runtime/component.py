@@ -30,7 +30,9 @@ class ComponentOptions(BusOptions, kw_only=True):
 
     tethered: bool = False
     """end when standard input closes, so that no process outlives the one that started it"""
-    id: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["robot-1"])] = ""
+    label: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["robot-1"])] = (
+        ""
+    )
     """a word in its made-up name on the bus, by which `phototaxis health` finds it"""
     ident: Annotated[str, Meta(max_length=24, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["robot-1"])] = (
         ""
@@ -41,7 +43,7 @@ class ComponentOptions(BusOptions, kw_only=True):
 
 
 def run(
-    role: str, options: ComponentOptions, serve: Callable[[Bus], None], label: str = "", worlds: Sequence[str] = ()
+    role: str, options: ComponentOptions, serve: Callable[[Bus], None], kind: str = "", worlds: Sequence[str] = ()
 ) -> None:
     """Open the bus as `role`, call `serve(bus)` and close everything, whatever happens.
 
@@ -53,7 +55,7 @@ def run(
     KeyboardInterrupt
         when all is closed after SIGINT, so that the exit code says so.
     """
-    ident = options.ident or unique_name(label or role, options.id)
+    ident = options.ident or unique_name(kind or role, options.label)
     with ExitStack() as stack:
         buses: list[Bus] = []
         for name in worlds or [options.name]:
@@ -91,9 +93,9 @@ def _stop(buses: Sequence[Bus]) -> None:
         bus.stop()
 
 
-def unique_name(label: str, word: str = "") -> str:
+def unique_name(kind: str, label: str = "") -> str:
     """A name on the bus that nobody else has: many may start at the same moment."""
-    return "-".join(filter(None, (label[:15], word, secrets.token_hex(4))))
+    return "-".join(filter(None, (kind[:15], label, secrets.token_hex(4))))
 
 
 def _hold_tether(stop: Callable[[], None]) -> None:
