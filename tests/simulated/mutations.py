@@ -175,10 +175,5 @@ MUTATIONS = [
     Mutation("accepts stale readings", SeatClient, "stale", lambda _: lambda self, readings: False),
     Mutation("stands by before it is the driver's equal", SeatClient, "_ready", lambda _: lambda self, *given: True),
     Mutation("applies a command twice", Steps, "apply", _left_out),
-    Mutation("asks a predecessor only once", Following, "again", lambda _: lambda self, now: []),
-    Mutation("keeps a seat for who has gone", Seat, "leave", lambda _: lambda self, agent, tick: False),
-    Mutation(
-        "does not replace a journal that was given up", Keeping, "write_failure", lambda _: lambda self, *given: []
-    ),
     Mutation("forgets a pause", Stepper, "_resume", _nothing),
 ]

@@ -17,7 +17,7 @@ ASK_EVERY_S = 0.2
 """Pause between two questions when the first one was refused or lost."""
 RELEASE_WITHIN_S = 0.5
 MATCH_WITHIN_S = 5.0
-"""A standby gets so long to become the equal of a driver, or of one that comes back; then it takes the seat as it is."""
+"""A standby gets so long to become the equal of a driver that drives or comes back; then it takes the seat as it is."""
 
 
 class Place(StrEnum):
