@@ -214,10 +214,13 @@ def test_another_run_is_joined_with_what_was_learned(world):
     learned = digest(desk.checkpoint())
     desk.world = msgspec.structs.replace(world, run="s", seed=8)
     effects = desk.read(Play(desk.world).readings(""))
-    assert kinds(effects) == [Ask, Flush, Begin, Ask]
+    assert kinds(effects) == [Ask, Flush, Save, Begin, Ask]
     assert desk.journal == [b"s"]
     assert desk.machine.seat.place is Place.SEEKING
     assert digest(desk.checkpoint()) == learned
+    again = continued(desk.world, desk, desk.journal)
+    again.read(Play(desk.world).readings(""))
+    assert digest(again.checkpoint()) == learned, "one that is killed in the new run has lost nothing of the old one"
 
 
 def test_what_is_published_was_kept_before(world):

@@ -240,7 +240,7 @@ class AgentClient:
         self.seat.enter()
         again = self._keeping.enter(world.run, agent.tick, now)
         if again is None:
-            effects += self._keeping.begin(world.run)
+            effects += self._keeping.begin(world.run, agent, now)
         for readings in again or ():
             session.answering.once(readings)
             effects.append(row(agent))

@@ -51,9 +51,9 @@ class Keeping:
         frames, self._frames = self._frames, []
         return self._again(frames, run, tick) if self._wanted and frames and frames[0] == run.encode() else None
 
-    def begin(self, run: str) -> list[Effect]:
-        """A new journal."""
-        return [Begin(run.encode())] if self._wanted else []
+    def begin(self, run: str, agent: SeatedAgent, now: float) -> list[Effect]:
+        """A new journal for a run. What the agent has learned in another one since its checkpoint is saved first."""
+        return [*self.save(agent, now), Begin(run.encode())] if self._wanted else []
 
     def entry(self, readings: Readings) -> list[Effect]:
         """One tick."""
