@@ -136,12 +136,18 @@ class Storm:
         """An agent of the same kind takes over; from now on it is the one that faults befall."""
         former = self.of("agent").ident
         self._join()
-        self._processes.pop(former, None)
+        self._forget(former)
 
     def replace_driver(self) -> None:
         """Forget an agent that has died for good; another one stands by."""
-        self._processes = {name: one for name, one in self._processes.items() if one.role != "agent" or not one.dead}
+        for name in [name for name, one in self._processes.items() if one.role == "agent" and one.dead]:
+            self._forget(name)
         self._join()
+
+    def _forget(self, agent: str) -> None:
+        """An agent is not started again."""
+        self._processes.pop(agent, None)
+        self.system.witness.former.add(agent)
 
     @cached_property
     def operator(self) -> Process:

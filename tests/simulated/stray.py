@@ -53,7 +53,7 @@ class Stray:
         """A command of a stranger, or of a former driver that is gone, for the newest tick."""
         heard = self._witness.published["state"]
         here = {process.ident for process in self._network.processes}
-        gone = {one.author for one in self._witness.published["command"]} - here - {one.driver for one in heard[-1:]}
+        gone = self._witness.former - here
         return "command", self._forged(heard[-1].run, self._rng.choice(["stray", *sorted(gone)])) if heard else None
 
     def _forged(self, run: str, author: str) -> Command:

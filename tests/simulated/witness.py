@@ -33,6 +33,7 @@ class Witness:
     on_tick : is told each tick that the simulation asks for.
     author : whose command was applied last.
     published : the states, readings and commands, in the order in which they came.
+    former : agents that are not started again once they are gone.
     learned : for each run that an agent has left, the last tick that it learned from.
     """
 
@@ -41,6 +42,7 @@ class Witness:
         self.answers: dict[tuple[str, str, int, str], Any] = {}
         self.published: dict[str, list[Any]] = {"state": [], "readings": [], "command": []}
         self.learned: list[int] = []
+        self.former: set[str] = set()
         self._kept: dict[str, tuple[str, int]] = {}
         self._states: dict[tuple[str, int], State] = {}
         self._newest: dict[str, tuple[str, int]] = {}
