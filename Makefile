@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 # The index of PyTorch's CPU builds; empty: the ordinary index alone (it may bring gigabytes of CUDA).
 TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
-TEST ?= tests
+TEST ?=
 SEEDS ?= 0:1000
 
 .PHONY: help setup demo test check bench storm picture clean
@@ -27,7 +27,7 @@ demo: $(VENV)/.demo ## watch it learn, and see how good it is: about a minute on
 	@$(BIN)/phototaxis demo --seed 1
 
 test: setup ## all tests, with real processes on a real bus
-	@$(BIN)/python -m pytest $(TEST)
+	@scripts/test $(BIN)/python $(TEST)
 
 check: setup ## style, types
 	@$(BIN)/ruff check .
