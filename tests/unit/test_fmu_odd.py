@@ -322,7 +322,7 @@ def test_a_crash_is_told_with_the_last_words(paper: Arena, sensors, tmp_path: Pa
     odd = altered(tmp_path / "odd.fmu", "faulty", 3, code)
     words = {"fmu_param": ["fault=5", "at=1"], "fmu_fallback": True}
     readings(sensors(light_fmu=str(odd), **words), paper, drive(1))
-    assert "crashed with SIGABRT; its last words: no calibration at tick 0" in capsys.readouterr().err
+    assert "crashed with SIGABRT; its last output: no calibration at tick 0" in capsys.readouterr().err
 
 
 def test_an_fmu_that_is_slower_than_real_time_is_named(paper: Arena, sensors, tmp_path: Path, capsys):
