@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis recorder", "Record the run on the bus, live and on disk.")
     if not options.insecure and not exposure.is_loopback(options.bind):
         raise UserError(
-            f"--bind {options.bind}: others could watch, since nothing guards the viewer; use 127.0.0.1, or add --insecure"
+            f"--bind {options.bind}: others could watch, since nothing guards the viewer; use 127.0.0.1 or --insecure"
         )
     silence_rerun()
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")  # it warns that footers are missing

@@ -1,4 +1,4 @@
-"""The paper's claims, each with what was measured and a verdict that follows from it."""
+"""The paper's claims; for each a function measures it and derives a verdict."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -11,16 +11,17 @@ from phototaxis_lab.cell import Outcome
 from phototaxis_lab.statistics import Interval, difference_interval, mean_interval, median_interval
 
 Data = Mapping[str, Mapping[int, Sequence[Outcome]]]
-"""Outcomes by the name of the system (`plan`) and by epochs, one for each seed."""
+"""Outcomes by name of the system (as in `plan`) and number of epochs; one for each seed."""
 
 
 class Finding(NamedTuple):
-    """What was measured, and what follows."""
+    """The measurement for a claim, and the verdict."""
 
     measured: str
     verdict: str
     """confirmed, refuted or undecided."""
     why: str
+    """A remark on the measurement or on its cause."""
 
 
 class Claim(NamedTuple):
@@ -32,29 +33,29 @@ class Claim(NamedTuple):
 
 
 def rates(outcomes: Sequence[Outcome]) -> list[float]:
-    """Success within 300 steps, seed by seed."""
+    """Return the success rates within 300 steps, one for each seed."""
     return [outcome.success_rate for outcome in outcomes]
 
 
 def mean(outcomes: Sequence[Outcome]) -> str:
-    """Mean success and its interval, in words."""
+    """Format the mean success and its interval."""
     return f"{np.mean(rates(outcomes)):.0%} {between(mean_interval(rates(outcomes)))}"
 
 
 def between(interval: Interval, sign: str = "") -> str:
-    """An interval of shares, in per cent."""
+    """Format an interval of shares in per cent."""
     return f"[{interval.low:{sign}.0%}, {interval.high:{sign}.0%}]"
 
 
 def decide(intervals: Sequence[Interval], level: float = 0.0) -> str:
-    """Confirmed when all intervals lie above the level, refuted when one lies below it, else undecided."""
+    """Return "confirmed" when all intervals lie above the level, "refuted" when one lies below it, else "undecided"."""
     if all(interval.low > level for interval in intervals):
         return "confirmed"
     return "refuted" if any(interval.high < level for interval in intervals) else "undecided"
 
 
 def compare(data: Data, better: str, worse: str, epochs: Sequence[int]) -> tuple[str, list[Interval]]:
-    """The success of one system less another's, in words and as intervals, after some numbers of epochs."""
+    """Compare the success of two systems after each number of epochs; return words, and intervals of the difference."""
     words, intervals = [], []
     for number in epochs:
         ours, theirs = rates(data[better][number]), rates(data[worse][number])
@@ -119,7 +120,7 @@ def rich_net_is_better(data: Data) -> Finding:
 
 
 def roughness(outcomes: Sequence[Outcome]) -> list[float]:
-    """How unsteady reward comes in, seed by seed: standard deviation over mean size of 100 equal stretches' rewards."""
+    """Return how unsteady the reward is, for each seed: standard deviation over mean size of 100 equal stretches."""
     stretches = [np.diff(outcome.rewards, prepend=0.0) for outcome in outcomes]
     return [float(one.std() / np.abs(one).mean()) for one in stretches]
 
@@ -137,10 +138,11 @@ def rich_net_is_steadier(data: Data) -> Finding:
 
 
 CROWDED = (1, 0, 0, 1), (2, 0, 0, 1), (0, 0, 0, 0)
+"""The states of the simple percept in which the paper's robot spent most of its time (section 6.2)."""
 
 
 def state_shares(outcomes: Sequence[Outcome]) -> np.ndarray:
-    """Share of the learning steps spent in each state, (seeds, states)."""
+    """Return the share of the learning steps spent in each state, shape (seeds, states)."""
     visits = np.array([outcome.visits for outcome in outcomes], dtype=float)
     return visits / visits.sum(axis=1, keepdims=True)
 
