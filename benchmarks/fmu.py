@@ -1,4 +1,4 @@
-"""Measures the cost of an FMU per tick, and how well learners do with it. Part of `make bench`; needs gcc, g++, make."""
+"""Measures the cost of an FMU per tick, and how well learners do with it. For `make bench`; needs gcc, g++ and make."""
 
 import os
 import statistics
