@@ -82,7 +82,7 @@ def simple_table(data: Data) -> Finding:
         f"median {np.median(found):.0%} {between(interval)}; {good} of {len(found)} seeds at 80% or more, worst "
         f"{min(found):.0%}",
         decide([interval], 0.8),
-        "the outcomes are bimodal: most seeds learn it, some do not, so the median is judged",
+        "the outcomes are bimodal (most seeds learn it, some do not), so we judge the median",
     )
 
 
@@ -90,7 +90,9 @@ def simple_net_is_worse(data: Data) -> Finding:
     """Claim 3."""
     words, gains = compare(data, "Q-table, simple", "net, simple", [3000])
     return Finding(
-        words, decide(gains), "the brighter side is coded 0, ½, 1 and the rewards differ by little in a sigmoid's range"
+        words,
+        decide(gains),
+        "the input codes the brighter side as 0, ½, 1, and in the range of a sigmoid the rewards differ by little",
     )
 
 
@@ -108,7 +110,7 @@ def rich_is_not_learnt(data: Data) -> Finding:
     return Finding(
         "after 5,000, 10,000, 30,000 epochs: " + "; ".join(words),
         verdict,
-        "+2 for any approach pays for wiggling in place as well as for coming; how much that costs depends on the "
+        "+2 for any approach rewards wiggling in place as well as coming closer; how much this costs depends on the "
         "discount, which the paper does not give: see the rows with other γ below",
     )
 
@@ -161,7 +163,7 @@ def time_piles_up(data: Data) -> Finding:
         f"{named}; most time is spent in {first}; with unchanged light {unchanged:.0%}; {back:.0%} of the steps "
         f"reverse the one before",
         verdict,
-        "of steps drawn at random 22% reverse the one before; in a room of 10 m with steps of 0.5 m the light seldom "
+        "of random steps 22% reverse the previous one; in a room of 10 m with steps of 0.5 m the light seldom "
         "stays the same for five steps; in the arena `pyro-realtime`, steps of 0.1 s, it does",
     )
 
@@ -173,7 +175,7 @@ def longer_separates(data: Data) -> Finding:
     return Finding(
         words,
         "refuted" if not apart[1] else "undecided" if apart[0] else "confirmed",
-        "confirmed would be: the interval excludes 0 after 60,000 epochs and did not yet after 30,000",
+        "it would be confirmed if the interval excluded 0 after 60,000 epochs but not after 30,000",
     )
 
 
@@ -193,7 +195,9 @@ def net_per_action_is_faster(data: Data) -> Finding:
     simple, first = compare(data, "net per action, simple", "net, simple", [1000, 3000])
     rich, second = compare(data, "net per action, rich", "net, rich", [5000])
     return Finding(
-        f"simple, {simple}; rich, {rich}", decide(first + second), "faster: more success after as many epochs"
+        f"simple, {simple}; rich, {rich}",
+        decide(first + second),
+        "faster means more success after the same number of epochs",
     )
 
 
@@ -204,7 +208,7 @@ def elman(data: Data) -> Finding:
     return Finding(
         f"simple, {simple}; rich, {rich}",
         decide(first + second),
-        'the paper makes no claim ("we are not sure"); judged is whether it is better than the plain net',
+        'the paper makes no claim ("we are not sure"); we test whether it is better than the plain net',
     )
 
 
