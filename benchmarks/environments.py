@@ -1,4 +1,4 @@
-"""Steps/s of the Gymnasium environments, in one process and behind the bus. Part of `make bench`."""
+"""Measures the steps/s of the Gymnasium environments, in one process and on the bus. Part of `make bench`."""
 
 import os
 import secrets
@@ -19,7 +19,7 @@ ROUNDS = 3
 
 
 def single(steps: int = 5000, **where: Any) -> float:
-    """Steps/s of one environment under random actions, resets included."""
+    """Measure the steps/s of one environment with random actions, resets included."""
     environment = gymnasium.make(NAME, percept="sensors", **where)
     environment.reset(seed=0)
     actions = np.random.default_rng(0).integers(9, size=steps)
@@ -34,7 +34,7 @@ def single(steps: int = 5000, **where: Any) -> float:
 
 
 def many(count: int, steps: int = 50_000, **where: Any) -> float:
-    """Robot steps/s of a vector environment under random actions, resets included."""
+    """Measure the robot steps/s of a vector environment with random actions, resets included."""
     robots = gymnasium.make_vec(NAME, num_envs=count, percept="sensors", **where)
     robots.reset(seed=0)
     turns = max(steps // count, 30)
@@ -49,7 +49,7 @@ def many(count: int, steps: int = 50_000, **where: Any) -> float:
 
 @contextmanager
 def system(robots: int) -> Iterator[dict[str, Any]]:
-    """A simulation and sensors on this machine's sockets; the options that lead there."""
+    """Run a simulation and sensors on this machine's sockets; gives the options that connect an environment to them."""
     world = f"bench-{secrets.token_hex(3)}"
     more = {"sim": [f"--robots={robots}"], "sensors": []}
     started = [
@@ -66,13 +66,13 @@ def system(robots: int) -> Iterator[dict[str, Any]]:
 
 
 def behind_the_bus(count: int) -> float:
-    """Robot steps/s over the bus."""
+    """Measure the robot steps/s of an environment on the bus."""
     with system(count) as where:
         return single(**where) if count == 1 else many(count, **where)
 
 
 def peer() -> float | None:
-    """Steps/s of aitk.robots with such sensors; None where AITK_PYTHON does not name a Python that has it."""
+    """Measure the steps/s of aitk.robots with similar sensors; None unless AITK_PYTHON names a Python that has it."""
     python = os.environ.get("AITK_PYTHON")
     if not python:
         return None
@@ -81,7 +81,7 @@ def peer() -> float | None:
 
 
 def report() -> None:
-    """Print all rates, medians of rounds that take turns."""
+    """Print all rates: medians over rounds, each of which measures all of them."""
     measured = {
         "single environment": single,
         **{f"vector, {count:,} robots": lambda count=count: many(count) for count in (1, 16, 256, 4096)},

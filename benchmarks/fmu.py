@@ -1,4 +1,4 @@
-"""What an FMU costs a tick, and how well a learner does with it. Part of `make bench`; needs gcc, g++ and make."""
+"""Measures the cost of an FMU per tick, and how well learners do with it. For `make bench`; needs gcc, g++ and make."""
 
 import os
 import statistics
@@ -23,9 +23,9 @@ EPOCHS = 3000
 
 
 def costs(arena: Arena, folder: Path) -> dict[str, float]:
-    """µs that both light readings take: the built-in model, and FMUs with their process, FMI 2 and 3.
+    """Measure the µs for both light readings, with the built-in model and with FMUs (FMI 2 and 3).
 
-    Both in the state of a sensors process that serves a run with an FMU: on one CPU.
+    All stay on one CPU, as the sensors do in a run with an FMU; the times include the switch of process.
     """
     here = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
     found = {"built-in": _cost(arena, FmuOptions())}
@@ -53,7 +53,10 @@ def _cost(arena: Arena, options: FmuOptions) -> float:
 
 
 def learners(arena: Arena, folder: Path) -> dict[tuple[str, str], list[float]]:
-    """(learner, sensor) → share of 200 fresh placements reached, one for each seed; measured with the same sensor."""
+    """Measure the success on 200 fresh placements of each (learner, sensor), one rate for each seed.
+
+    The learner trains and is measured with the same sensor.
+    """
     found = {}
     for learner in ("qtable", "mirror"):
         for name, options in _sensors(folder).items():

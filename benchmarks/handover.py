@@ -1,4 +1,4 @@
-"""How long the robot waits when its driver changes: swapped, killed, frozen. Part of `make bench`."""
+"""Measures how long the robot waits when its driver is swapped, killed or frozen. Part of `make bench`."""
 
 import os
 import secrets
@@ -18,10 +18,11 @@ from phototaxis.wire.codec import Decoder
 from phototaxis.wire.messages import State, Status
 
 DEADLINE = 30.0
+"""Seconds to wait for each change of the system's status."""
 
 
 def measure(rounds: int) -> dict[str, tuple[float, float]]:
-    """Milliseconds from the last tick of the old driver to the first of the new one; and the same in usual ticks."""
+    """Return, for each way, the wait from the old driver's last tick to the new one's first: ms, and in usual ticks."""
     ways = {"swapped (inherits over the bus)": None, "killed": signal.SIGKILL, "frozen (SIGSTOP)": signal.SIGSTOP}
     found: dict[str, list[tuple[float, float]]] = {way: [] for way in ways}
     for _ in range(rounds):
@@ -35,7 +36,10 @@ def _median(pairs: list[tuple[float, float]], place: int) -> float:
 
 
 def _pause(number: signal.Signals | None) -> tuple[float, float]:
-    """The pause, ms, when the driver is sent a signal and a standby drives on, or (None) is swapped at tick 2,000."""
+    """Return the wait in ms and in usual ticks when a signal stops the driver and a standby drives on.
+
+    With None, there is no signal, but a swap at tick 2,000.
+    """
     world, ticks = f"bench-{secrets.token_hex(3)}", dict[int, tuple[float, str]]()
     decode = Decoder(State, 4096)
 
@@ -66,12 +70,12 @@ def _pause(number: signal.Signals | None) -> tuple[float, float]:
     moments = [(*ticks[tick], tick) for tick in sorted(ticks)]
     steps = [later[0] - earlier[0] for earlier, later in pairwise(moments)]
     first = next(index for index, (_, author, _) in enumerate(moments) if author == "new")
-    pause = max(steps[first - 3 : first])  # an episode may begin just there: then nobody is the author of a tick
+    pause = max(steps[first - 3 : first])  # of 3 steps, since a tick that begins an episode has no author
     return 1000 * pause, pause / statistics.median(steps)
 
 
 def _pass(bus: Bus, ticks: int) -> None:
-    """Let some ticks pass."""
+    """Wait until some ticks have passed."""
     first: list[int] = []
     _until(bus, lambda status: first.append(status.tick) or status.tick > first[0] + ticks)
 
@@ -82,7 +86,7 @@ def _until(bus: Bus, wanted: Callable[[Status], bool]) -> None:
         event = bus.receive(timeout=0.1)
         if event is not None and event.topic == "status" and wanted(event.message):
             return
-    raise SystemExit("the system does not come up")
+    raise SystemExit(f"the system did not reach the expected status within {DEADLINE:g} s")
 
 
 @contextmanager
@@ -98,7 +102,7 @@ def _process(role: str, world: str, *words: str) -> Iterator[subprocess.Popen[by
 
 
 def lines(rounds: int) -> list[str]:
-    """What `measure` found, for a person."""
+    """Measure, and return the result as lines for a person."""
     rows = [f"  {way:40} {pause:9.1f} {ticks:12.0f}" for way, (pause, ticks) in measure(rounds).items()]
     return [f"  {'':40} {'pause, ms':>9} {'usual ticks':>12}", *rows]
 

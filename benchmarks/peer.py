@@ -1,7 +1,7 @@
-"""Steps/s of aitk.robots, the simulator of the paper's tradition, with sensors like ours: for `make bench`.
+"""Measures the steps/s of aitk.robots, a successor of the paper's simulator, with sensors like ours, for `make bench`.
 
-It needs an environment of its own (it brings TensorFlow): pip install aitk.robots, and its python in AITK_PYTHON.
-One step is one time step of its world and one reading of all sensors; ours is a control period of five
+Install aitk.robots in an environment of its own, since it installs TensorFlow, and name its Python in AITK_PYTHON.
+One step is one time step of its world and one reading of all sensors; one of our steps is a control period of five
 physics steps and the same readings.
 """
 

@@ -1,8 +1,8 @@
-"""The bare ring: three Python processes that pass payloads of our sizes round, in our configuration.
+"""Measures a bare ring: three Python processes that pass on payloads of our sizes, with our Zenoh configuration.
 
     python benchmarks/ring.py TICKS
 
-Prints the ring's ticks/s: what Zenoh, Python's threads and this machine allow before any of our code.
+It prints the ring's ticks/s, the upper limit that Zenoh, Python's threads and this machine set for our processes.
 """
 
 import subprocess
@@ -18,11 +18,11 @@ from zenoh.handlers import Callback
 SIZES = {"state": 213, "readings": 281, "command": 73}
 """Bytes of our three messages (measured: `benchmarks/run.py` prints them)."""
 NEXT = {"sim": ("command", "state"), "sensors": ("state", "readings"), "agent": ("readings", "command")}
-"""What each process waits for, and what it then sends."""
+"""The message that each process waits for, and the one that it then sends."""
 
 
 def member(session: zenoh.Session, name: str, role: str) -> tuple[SimpleQueue[Any], zenoh.Publisher]:
-    """A place in the ring: an inbox and a publisher."""
+    """Return the inbox and the publisher of one process of the ring."""
     inbox: SimpleQueue[Any] = SimpleQueue()
     reads, writes = NEXT[role]
     session.declare_subscriber(f"{name}/{reads}", Callback(inbox.put, indirect=False))
@@ -33,7 +33,7 @@ def member(session: zenoh.Session, name: str, role: str) -> tuple[SimpleQueue[An
 
 
 def came(inbox: SimpleQueue[Any], seconds: float) -> bool:
-    """Whether something came within some seconds; it is taken out."""
+    """Take a message out of the inbox; return whether one came within `seconds`."""
     try:
         inbox.get(timeout=seconds)
     except Empty:
@@ -42,7 +42,7 @@ def came(inbox: SimpleQueue[Any], seconds: float) -> bool:
 
 
 def follow(role: str, name: str) -> None:
-    """Pass on whatever comes until it is empty."""
+    """Answer each message with a payload of our size, until an empty message comes."""
     payload = bytes(SIZES[NEXT[role][1]])
     with open_session(role, BusOptions(name=name)) as session:
         inbox, publisher = member(session, name, role)
@@ -52,14 +52,14 @@ def follow(role: str, name: str) -> None:
 
 
 def lead(name: str, ticks: int) -> float:
-    """Start the others and count: ticks/s."""
+    """Start the other processes, and measure the ticks/s of the ring."""
     followers = [subprocess.Popen([sys.executable, __file__, role, name]) for role in NEXT if role != "sim"]
     payload = bytes(SIZES["state"])
     with open_session("sim", BusOptions(name=name)) as session:
         inbox, publisher = member(session, name, "sim")
-        while not came(inbox, 0.05):  # until both are there
+        while not came(inbox, 0.05):  # until both processes are connected
             publisher.put(payload)
-        while came(inbox, 0.2):  # what still goes round
+        while came(inbox, 0.2):  # until the ring is empty again
             pass
         began = time.perf_counter()
         for _ in range(ticks):

@@ -1,7 +1,7 @@
-"""`make bench`: rates and costs on this machine, in one run.
+"""`make bench`: measures rates and costs on this machine.
 
-Every figure is the median of several rounds that take turns, so that a noisy machine disturbs all alike.
-Compare ratios, not single figures.
+Each round measures every rate once, and a rate is the median over rounds, so that other load disturbs all rates alike.
+Compare ratios rather than single figures.
 """
 
 import json
@@ -99,7 +99,7 @@ def main() -> None:
 
 
 def learners(arena: Arena) -> list[tuple[str, float, float]]:
-    """Each learner with each percept that suits it: training steps/s, and µs of one `values` and one `learn`."""
+    """Measure each learner with each of its percepts: training steps/s, and µs of one `values` and one `learn`."""
     rows = []
     every = [(name, percept) for name in available_learners() for percept in ("simple", "rich")] + [
         ("dqn", "continuous")
@@ -116,7 +116,7 @@ def learners(arena: Arena) -> list[tuple[str, float, float]]:
 
 
 def batches(arena: Arena) -> list[tuple[int, float]]:
-    """Robot steps/s of evaluations with different numbers of robots."""
+    """Measure the robot steps/s of evaluations with different numbers of robots."""
     policy = SETUP.agent(World(run="bench", arena=arena, seed=1, epochs=0), learning=False).policy
     rows = []
     for count in (1, 16, 256, 4096):
@@ -132,7 +132,7 @@ def batches(arena: Arena) -> list[tuple[int, float]]:
 
 
 def ratios(rounds: list[dict[str, float]]) -> dict[str, float]:
-    """The ratios that matter, each from figures of the same round."""
+    """Return the medians of ratios, each computed from figures of the same round."""
 
     def median(ratio: Callable[[dict[str, float]], float]) -> float:
         return statistics.median(map(ratio, rounds))
@@ -151,7 +151,7 @@ def ratios(rounds: list[dict[str, float]]) -> dict[str, float]:
 
 
 def with_obstacles(arena: Arena, count: int) -> Arena:
-    """A hall of 60 × 60 m with round pillars at random places, the light in its middle."""
+    """Return a hall of 60 × 60 m with round pillars at random places and the light in its middle."""
     rng = np.random.default_rng(0)
     pillars: list[Disc] = []
     while len(pillars) < count:
@@ -162,18 +162,18 @@ def with_obstacles(arena: Arena, count: int) -> Arena:
 
 
 def in_process(arena: Arena) -> float:
-    """Epochs/s of the loop in one process: physics, 16 sonars, lights, Q-table."""
+    """Measure the epochs/s of the loop in one process: physics, 16 sonars, lights, Q-table."""
     return EPOCHS / train(SETUP, arena, 1, EPOCHS)[1]
 
 
 def ring() -> float:
-    """Ticks/s of the bare ring."""
+    """Measure the ticks/s of the bare ring."""
     script = str(Path(__file__).with_name("ring.py"))
     return float(subprocess.run([sys.executable, script, "10000"], capture_output=True, check=True).stdout)
 
 
 def over_the_bus(*words: str) -> float:
-    """Ticks/s of `phototaxis up` in lockstep."""
+    """Measure the ticks/s of `phototaxis up` in lockstep."""
     with tempfile.TemporaryDirectory() as folder:
         command = [
             sys.executable, "-m", "phototaxis_launcher", "up", "--json", "--name=bench", f"--out={folder}",
@@ -184,7 +184,7 @@ def over_the_bus(*words: str) -> float:
 
 
 def parts(arena: Arena) -> dict[str, float]:
-    """The cost of each part of one tick, µs."""
+    """Measure the cost of each part of one tick, µs."""
     loop = Loop(arena, SETUP.agent(World(run="bench", arena=arena, seed=1, epochs=0)), 1)
     for _ in range(500):
         loop.step()
@@ -217,7 +217,7 @@ def parts(arena: Arena) -> dict[str, float]:
 
 
 def agent_step(loop: Loop, readings: Readings) -> None:
-    """One step of the agent on readings that follow its last ones."""
+    """Run one step of the agent, on readings that follow its previous ones."""
     readings.tick += 1
     readings.episode = readings.tick // 50
     readings.author, readings.left, readings.right = "a", 1.0, 0.0
@@ -225,19 +225,19 @@ def agent_step(loop: Loop, readings: Readings) -> None:
 
 
 def learner_step(loop: Loop) -> None:
-    """What the agent asks of its learner in one step."""
+    """Call the learner as the agent does in one step."""
     loop.agent.learner.values((0, 0, 0, 0))
     loop.agent.learner.learn(Transition((0, 0, 0, 0), 3, 0.01, (1, 0, 0, 0), False, 0.5, False))
 
 
 def taking_turns() -> float:
-    """µs of the sensor suite when two other processes run it in between: what cold caches cost."""
+    """Measure the µs of the sensor suite when two other processes run in between: the cost of cold caches."""
     command = [sys.executable, str(Path(__file__).with_name("turns.py"))]
     return float(subprocess.run(command, capture_output=True, check=True).stdout)
 
 
 def recorder_cost(arena: Arena, loop: Loop) -> float:
-    """µs a tick to turn log chunks into Rerun columns on disk."""
+    """Measure the µs per tick to write log chunks as Rerun columns to disk."""
     from phototaxis.wire.messages import AgentLog, SensorsLog, SimLog
     from phototaxis_recorder.sinks import RecordingSinks
 
@@ -273,7 +273,7 @@ def recorder_cost(arena: Arena, loop: Loop) -> float:
 
 
 def cost(call: Callable[[], Any], times: int = 2000) -> float:
-    """Median µs of a call, in five batches."""
+    """Return the µs of a call: the median of five batches."""
     batches = []
     for _ in range(5):
         began = time.perf_counter()

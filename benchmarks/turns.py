@@ -1,7 +1,7 @@
-"""The sensor suite timed while two other processes run it in turn: the price of a process of one's own.
+"""Measures the sensor suite while two other processes run it in turn, to show what separate processes cost.
 
-Without Zenoh, on pipes; each process finds the caches and branch predictors as the others left them.
-Prints the median in µs.
+The processes take turns over pipes, without Zenoh; each finds the CPU's caches and branch predictors as the others
+left them. It prints the median in µs.
 """
 
 import os
@@ -21,7 +21,7 @@ ROUNDS = 3000
 def main() -> None:
     simulation = Simulation(arenas.load("paper"), 1, "bench")
     suite, state = SensorSuite(simulation.world), simulation.advance(1.0, 1.0, "bench")
-    if len(sys.argv) > 1:  # one of the others
+    if len(sys.argv) > 1:  # this is one of the two other processes
         while os.read(0, 1):
             suite(state)
             os.write(1, b"x")

@@ -1,4 +1,4 @@
-"""A deep Q-network in one file, in the manner of CleanRL: sixteen robots at once, in this process or behind the bus.
+"""A deep Q-network in one file, in the style of CleanRL; it drives sixteen robots, in this process or on the bus.
 
 python examples/cleanrl_dqn.py --steps 30000
 phototaxis sim --robots 16 & phototaxis sensors &
@@ -23,17 +23,17 @@ class Options:
     """Hyperparameters."""
 
     seed: int = 0
-    """of everything"""
+    """seed of all randomness"""
     steps: int = 30_000
-    """robot steps in all"""
+    """total steps of all robots"""
     robots: int = 16
-    """robots that gather experience together"""
+    """number of robots that gather experience together"""
     connect: str = ""
-    """local, or tcp/HOST:7447: a running system with so many robots"""
+    """local, or tcp/HOST:7447, for a running system with as many robots"""
     world: str = "phototaxis"
-    """its name"""
+    """name of the running system's world"""
     gamma: float = 0.6
-    """discount"""
+    """discount factor"""
     learning_rate: float = 1e-3
     """learning rate of Adam"""
     batch_size: int = 128
@@ -43,9 +43,9 @@ class Options:
     target: int = 100
     """updates between copies of the net to the target net"""
     explore: float = 0.4
-    """share of the steps in which the share of random actions falls from 1 to `last`"""
+    """fraction of the steps during which the share of random actions falls from 1 to `last`"""
     last: float = 0.05
-    """share of random actions in the end"""
+    """share of random actions at the end"""
 
 
 def network(inputs: int, actions: int) -> nn.Module:
@@ -53,7 +53,7 @@ def network(inputs: int, actions: int) -> nn.Module:
 
 
 def success(net: nn.Module, placements: int = 200, seed: int = 1_000_000) -> float:
-    """Share of fresh placements from which the light is reached within 300 steps."""
+    """Return the share of fresh placements from which the robot reaches the light within 300 steps."""
     robots = gymnasium.make_vec(NAME, num_envs=placements, percept="continuous", max_episode_steps=300)
     seen, _ = robots.reset(seed=seed)
     reached, over = np.zeros(placements, bool), np.zeros(placements, bool)
@@ -89,7 +89,7 @@ def train(options: Options) -> nn.Module:
         dice = rng.random(options.robots) < 1 + used * (options.last - 1)
         action = np.where(dice, rng.integers(actions, size=options.robots), action)
         following, reward, terminated, truncated, _ = robots.step(action)
-        for row in np.flatnonzero(~over):  # a robot that has been placed anew has not acted
+        for row in np.flatnonzero(~over):  # a robot that has just begun a new episode did not act in this step
             memory.append((seen[row], action[row], reward[row], following[row], float(terminated[row])))
         seen, over = following, terminated | truncated
         if len(memory) < options.start:

@@ -1,4 +1,4 @@
-"""An agent that knows nothing of this project but its wire format (docs/wire.md): it steers to the brighter side.
+"""An agent that uses only this project's wire format (docs/wire.md), none of its code; it steers to the brighter side.
 
 phototaxis router --listen tcp/127.0.0.1:7447 &
 phototaxis sim --connect tcp/127.0.0.1:7447 &
@@ -14,7 +14,7 @@ import msgpack
 import zenoh
 
 if len(sys.argv) < 2:
-    sys.exit("where is the router? as in: python examples/foreign_agent.py tcp/127.0.0.1:7447 [WORLD]")
+    sys.exit("give the router's address, as in: python examples/foreign_agent.py tcp/127.0.0.1:7447 [WORLD]")
 endpoint, world, me = sys.argv[1], "".join(sys.argv[2:3]) or "phototaxis", "chaser"
 connect = {"endpoints": [endpoint], "timeout_ms": 2000, "exit_on_failure": True}
 config = {"mode": "client", "connect": connect, "scouting": {"multicast": {"enabled": False}}}
@@ -29,13 +29,13 @@ with session:
     session.declare_subscriber(
         f"{world}/readings", lambda sample: inbox.put(msgpack.unpackb(sample.payload.to_bytes()))
     )
-    token = session.liveliness().declare_token(f"{world}/alive/agent/{me}")  # lasts as long as the variable
+    token = session.liveliness().declare_token(f"{world}/alive/agent/{me}")  # exists as long as this variable
     run, newest, claim = "", -1, msgpack.packb({"verb": "claim", "agent": me})
     while True:
         try:
             readings = inbox.get(timeout=30)
         except (Empty, KeyboardInterrupt):
-            break  # the world is gone, or Ctrl-C
+            break  # no readings for 30 s, or Ctrl-C
         if readings["run"] != run:
             run, newest = readings["run"], -1
         if not readings["driver"]:

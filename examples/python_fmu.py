@@ -1,4 +1,4 @@
-"""A light sensor in Python, as an FMU: it sees nothing behind it, and tires in bright light.
+"""A light sensor as an FMU in Python: it sees nothing behind it, and becomes less sensitive in bright light.
 
 pip install pythonfmu
 python -m pythonfmu build -f examples/python_fmu.py
@@ -12,7 +12,7 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 
 class TiringEye(Fmi2Slave):
-    """Inputs and outputs by the names that Phototaxis looks for; no --fmu-map is needed."""
+    """The sensor; its variables have the names that Phototaxis looks for, so it needs no --fmu-map."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
@@ -27,7 +27,7 @@ class TiringEye(Fmi2Slave):
         self.register_variable(Real("recovery", description="time constant, s", **tunable))
 
     def exit_initialization_mode(self):
-        self.tired = 0.0  # an episode begins: after a reset, too
+        self.tired = 0.0  # each episode begins here, also after a reset
 
     def do_step(self, current_time, step_size):
         light = self.visibility * self.brightness / max(self.distance, 1.0) ** 2

@@ -1,11 +1,11 @@
-"""Stable-Baselines3's DQN or PPO, as they are, learn to find the light; then they are measured on fresh placements.
+"""Trains Stable-Baselines3's DQN or PPO, unchanged, to find the light, and measures it on fresh placements.
 
     python examples/sb3.py --learner dqn --steps 5000
     python examples/sb3.py --learner ppo --steps 10000 --save ppo.zip
     phototaxis up --epochs 0 &
     python examples/sb3.py --learner dqn --steps 2000 --connect local
 
-With --connect the robot is that of a running system (its recorder shows it), and learning is as slow as that.
+With --connect it drives the robot of a running system, whose recorder shows it; learning is then slower.
 """
 
 import argparse
@@ -32,7 +32,7 @@ HYPERPARAMETERS = {
 
 
 def success(model: BaseAlgorithm, placements: int = 200, seed: int = 1_000_000) -> float:
-    """Share of the placements from which the light is reached within 300 steps."""
+    """Return the share of fresh placements from which the robot reaches the light within 300 steps."""
     robots = gymnasium.make_vec(NAME, num_envs=placements, percept="continuous", max_episode_steps=300)
     seen, _ = robots.reset(seed=seed)
     reached, over = np.zeros(placements, bool), np.zeros(placements, bool)
@@ -49,9 +49,9 @@ def main() -> None:
     parser.add_argument("--learner", choices=HYPERPARAMETERS, default="dqn")
     parser.add_argument("--steps", type=int, default=5000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--connect", default="", help="local, or tcp/HOST:7447: a running system")
-    parser.add_argument("--world", default="phototaxis", help="its name")
-    parser.add_argument("--save", help="file for the policy")
+    parser.add_argument("--connect", default="", help="local, or tcp/HOST:7447, for a running system")
+    parser.add_argument("--world", default="phototaxis", help="name of the running system's world")
+    parser.add_argument("--save", help="file in which to save the policy")
     options = parser.parse_args()
     where = {"connect": options.connect, "world": options.world} if options.connect else {}
     try:

@@ -1,4 +1,4 @@
-"""Double Q-learning (van Hasselt 2010): two tables, each judged by the other; noise does not look like value."""
+"""Double Q-learning (van Hasselt 2010): two tables evaluate each other's best actions, so noise adds no value."""
 
 from typing import Annotated
 
@@ -9,18 +9,18 @@ from phototaxis_agent.learner import Learner, Transition, annealed, discrete, st
 
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
-    """Of the two tables."""
+    """The hyperparameters of `DoubleQ`."""
 
     learning_rate: Annotated[float, Meta(gt=0, le=1)] = 0.16
     """learning rate at the first epoch; it falls geometrically to `learning_rate_end`"""
     learning_rate_end: Annotated[float, Meta(gt=0, le=1)] = 0.01
-    """learning rate at the end"""
+    """learning rate at the end of the budget"""
     gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.75
     """discount factor"""
 
 
 class DoubleQ(Learner):
-    """Acts on the mean of two tables; each learning step changes one of them, drawn by lot."""
+    """A learner whose values are the mean of two tables; each learning step updates one of them, chosen at random."""
 
     Options = Hyperparameters
 

@@ -178,7 +178,7 @@ def test_columns_of_the_wrong_size_are_refused_and_the_run_goes_on(system, world
 
 def test_what_is_for_one_robot_says_so(system, world, start, fmu: Built):
     system(3)
-    with pytest.raises(Error, match=r"has 3 robots: gymnasium\.make_vec drives them"):
+    with pytest.raises(Error, match=r"has 3 robots: use gymnasium\.make_vec"):
         gymnasium.make(NAME, connect="local", world=world)
     with pytest.raises(Error, match="has 3 robots, num_envs is 4; start it with --robots 4"):
         gymnasium.make_vec(NAME, num_envs=4, connect="local", world=world)

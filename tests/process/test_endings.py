@@ -118,7 +118,7 @@ def test_a_demo_in_a_terminal_can_be_watched_until_ctrl_c(world, tmp_path):
     grpc, web = free_ports(2)
     words = "--name", world, "--out", tmp_path, "--epochs", 12, "--seed", 7, "--grpc-port", grpc, "--web-port", web
     terminal = Terminal("demo", *words)
-    terminal.read_until("What is to be seen")
+    terminal.read_until("What you see")
     terminal.read_until("Ctrl-C ends")
     with socket.create_connection(("127.0.0.1", grpc)), socket.create_connection(("127.0.0.1", web)):
         pass

@@ -77,12 +77,12 @@ def test_a_damaged_archive(fmu: Built, tmp_path, version, case):
 TOKEN = {2: 'guid="{', 3: 'instantiationToken="{'}
 FMI = {2: 'fmiVersion="2.0"', 3: 'fmiVersion="3.0"'}
 DESCRIBED = {
-    "wrong version": (FMI, 'fmiVersion="1.0"', "its FMI version is 1.0; needed is 2.0 or 3.0"),
+    "wrong version": (FMI, 'fmiVersion="1.0"', "its FMI version is 1.0; it must be 2.0 or 3.0"),
     "unknown version": (FMI, 'fmiVersion="9.1"', "its FMI version is 9.1"),
     "schema": ({2: "causality=", 3: "causality="}, "casuality=", "its modelDescription.xml is not valid"),
     "wrong token": (TOKEN, {2: 'guid="{0', 3: 'instantiationToken="{0'}, "cannot be instantiated (the "),
     "wrong causality": (
-        {2: 'causality="output"', 3: 'causality="output"'}, 'causality="local"', "reading is of causality local",
+        {2: 'causality="output"', 3: 'causality="output"'}, 'causality="local"', "reading has causality local",
     ),
 }  # fmt: skip
 
@@ -100,14 +100,14 @@ def test_a_description_that_does_not_fit(fmu: Built, tmp_path, version, case):
 def test_model_exchange_alone(fmu: Built, tmp_path, version):
     file = described(fmu("light", version), tmp_path / "x.fmu", "CoSimulation", "ModelExchange")
     file = described(file, tmp_path / "bad.fmu", ' canHandleVariableCommunicationStepSize="true"', "")
-    refused("made for Model Exchange alone", "sensors", "--light-fmu", file)
+    refused("supports only Model Exchange", "sensors", "--light-fmu", file)
 
 
 @VERSIONS
 def test_sources_alone_are_compiled_only_when_allowed(tmp_path, version):
     file = tmp_path / "lag.fmu"
     build(EXAMPLES["lag"], version, file, sources_only=True)
-    refused("has C sources alone; add --allow-compile", "sensors", "--light-fmu", file)
+    refused("has only C sources; add --allow-compile", "sensors", "--light-fmu", file)
     done = phototaxis("fmu", "check", file, "--allow-compile")
     assert done.returncode == 0, done.stderr
     assert "light: 400 ticks" in done.stdout
@@ -291,7 +291,7 @@ def test_an_fmu_in_python(tmp_path):
     done = phototaxis("fmu", "check", file, "--fmu-param", "recovery=5")
     assert done.returncode == 0, done.stderr
     assert "light: 400 ticks in 8 episodes" in done.stdout
-    assert "not as the standard has it: ModelStructure/InitialUnknowns" in done.stderr
+    assert "does not follow the standard: ModelStructure/InitialUnknowns" in done.stderr
 
 
 def test_what_an_fmu_in_python_raises_is_told(tmp_path):

@@ -121,9 +121,9 @@ def test_errors_are_gymnasiums_own(system, world, start):
     environment.reset(seed=1)
     with pytest.raises(InvalidAction):
         environment.unwrapped.step(9)
-    with pytest.raises(Error, match="render_mode 'rgb_array': that is the running system's"):
+    with pytest.raises(Error, match="render_mode 'rgb_array': the running system decides that"):
         make(world, render_mode="rgb_array")
-    with pytest.raises(Error, match="arena 'doorway': that is the running system's"):
+    with pytest.raises(Error, match="arena 'doorway': the running system decides that"):
         make(world, arena="doorway")
     with pytest.raises(TypeError, match="cannot be copied or pickled: it holds the driver's seat"):
         copy.deepcopy(environment)
@@ -215,7 +215,7 @@ def test_a_killed_component_is_an_error_and_no_hang(system, world, role):
     environment = gymnasium.make(NAME, connect="local", world=world, timeout=1.5)
     environment.reset(seed=1)
     system[role].kill()
-    with pytest.raises(Error, match=f"{role} not there"):
+    with pytest.raises(Error, match=f"{role} not on the bus"):
         walk(environment, 100, 1)
     environment.close()
 

@@ -153,7 +153,7 @@ def test_names_units_and_parameters(fmu: Built, paper: Arena, sensors, tmp_path:
     with pytest.raises(UserError, match="there is no FMU"):
         sensors(fmu_param=["tau=1"])
     both = {"light_fmu": str(fmu("lag", 3)), "sonar_fmu": str(fmu("lag", 2))}
-    with pytest.raises(UserError, match=r"of which FMU\? say light.tau=… or sonar.tau=…"):
+    with pytest.raises(UserError, match=r"for which FMU\? write light.tau=… or sonar.tau=…"):
         sensors(**both, fmu_param=["tau=1"])
     sensors(**both, fmu_param=["light.tau=1", "sonar.tau=2"]).try_out()
     with pytest.raises(UserError, match="the light model has no 'colour', but distance, bearing"):
@@ -173,21 +173,21 @@ def test_another_step_than_the_suggested_one_is_said_once(fmu: Built, paper: Are
 def test_what_cannot_be_wired(fmu: Built, tmp_path: Path):
     light, sonar = fmu("light", 3), fmu("sonar", 3)
     cases = [
-        (light, 'causality="output"', 'causality="local"', "reading is of causality local; needed is output"),
-        (light, 'causality="input" description="of the lamp"',
+        (light, 'causality="output"', 'causality="local"', "reading has causality local; it must be output"),
+        (light, 'causality="input" description="brightness of the lamp"',
          'causality="parameter" variability="fixed" description="x"',
-         "brightness is of causality parameter; needed is input"),
-        (sonar, '<Dimension start="16" />', '<Dimension start="4" />', "range has 4 values; needed is 1 or 16"),
+         "brightness has causality parameter; it must be input"),
+        (sonar, '<Dimension start="16" />', '<Dimension start="4" />', "range has 4 values; it must have 1 or 16"),
     ]  # fmt: skip
     for number, (source, old, new, line) in enumerate(cases):
         file = described(source, tmp_path / f"{number}.fmu", old, new)
         suite = SUITES["sonar" if source is sonar else "light"]
         with pytest.raises(UserError, match=line):
             connect(read(str(file)), suite, {}, {})
-    with pytest.raises(UserError, match="which input it is, is not clear"):
+    with pytest.raises(UserError, match="it is not clear which input to use"):
         connect(read(str(fmu("sonar", 2))), SUITES["light"], {}, {})
     integer = edited(light, tmp_path / "i.fmu", _integer_distance)
-    with pytest.raises(UserError, match="distance is of type Int32; needed is Float64"):
+    with pytest.raises(UserError, match="distance has type Int32; it must be Float64"):
         connect(read(str(integer)), SUITES["light"], {}, {})
 
 

@@ -168,7 +168,7 @@ def test_an_fmu_with_steps_of_its_own_gets_them(fmu: Built, paper: Arena, sensor
     plain = altered(tmp_path / "plain.fmu", "lag", version, code)
     assert readings(sensors(light_fmu=str(plain), fmu_step=0.1), paper, drive(30)) == found
     assert capsys.readouterr().err == ""
-    with pytest.raises(UserError, match=r"--fmu-step 0.3: the control period, 0.5 s, is no whole number of such steps"):
+    with pytest.raises(UserError, match=r"--fmu-step 0.3: the control period, 0.5 s, is not a whole number of steps"):
         readings(sensors(light_fmu=str(plain), fmu_step=0.3), paper, drive(1))
 
 
@@ -180,10 +180,10 @@ def test_an_fmu_with_steps_of_its_own_gets_them(fmu: Built, paper: Arena, sensor
         ("", "0.5", 0.5, (0.5, 1, "")),
         ("", "0.3", 0.5, (0.5, 1, "has steps of 0.3 s; it gets")),
         ("", "1", 0.5, (0.5, 1, "has steps of 1 s; it gets")),
-        ('canHandleVariableCommunicationStepSize="true"', "0.1", 0.5, (0.5, 1, r"\(--fmu-step 0.1 gives it its own\)")),
+        ('canHandleVariableCommunicationStepSize="true"', "0.1", 0.5, (0.5, 1, r"\(for its own: --fmu-step 0.1\)")),
         ("", "1e-9", 0.5, (0.5, 1, "it gets steps of 0.5 s, the control period$")),
         ("", "0.50000000001", 0.5, (0.5, 1, "")),
-        ('canHandleVariableCommunicationStepSize="true"', "0.16666666666667", 0.5, (0.5, 1, "step 0.16666666666667 ")),
+        ('canHandleVariableCommunicationStepSize="true"', "0.16666666666667", 0.5, (0.5, 1, "step 0.16666666666667")),
         *[("", none, 0.5, (0.5, 1, "the control period$")) for none in ("NaN", "INF", "-0.1", "1e-320")],
         ("", "0.1", 0.3, (0.1, 3, "")),
     ],
@@ -200,7 +200,7 @@ def test_which_steps_an_fmu_gets(fmu: Built, tmp_path: Path, interface, step, pe
 
 
 def test_a_step_that_is_no_length_is_refused(fmu: Built):
-    with pytest.raises(UserError, match=r"the control period, 0.5 s, is no whole number of such steps"):
+    with pytest.raises(UserError, match=r"the control period, 0.5 s, is not a whole number of steps"):
         plan_steps(read(str(fmu("lag", 2))).description, 0.5, 1e-320)
 
 
@@ -303,7 +303,7 @@ def test_what_an_fmu_says_is_bounded(paper: Arena, sensors, tmp_path: Path, caps
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == MAX_LINES + 1
     assert lines[0].endswith("prints: line 0 of 0")
-    assert lines[-1].endswith("says more, which is not shown (--fmu-log shows more)")
+    assert lines[-1].endswith("has more output, which is not shown (--fmu-log shows more)")
 
 
 def test_a_line_is_bounded_and_printable():
@@ -322,7 +322,7 @@ def test_a_crash_is_told_with_the_last_words(paper: Arena, sensors, tmp_path: Pa
     odd = altered(tmp_path / "odd.fmu", "faulty", 3, code)
     words = {"fmu_param": ["fault=5", "at=1"], "fmu_fallback": True}
     readings(sensors(light_fmu=str(odd), **words), paper, drive(1))
-    assert "crashed with SIGABRT; its last words: no calibration at tick 0" in capsys.readouterr().err
+    assert "crashed with SIGABRT; its last output: no calibration at tick 0" in capsys.readouterr().err
 
 
 def test_an_fmu_that_is_slower_than_real_time_is_named(paper: Arena, sensors, tmp_path: Path, capsys):
@@ -454,11 +454,11 @@ BEAMS = {
 
 def test_a_structural_parameter_sets_the_size_of_arrays(fmu: Built, paper: Arena, sensors, tmp_path: Path):
     odd = altered(tmp_path / "odd.fmu", "sonar", 3, STRUCTURAL, BEAMS)
-    with pytest.raises(UserError, match="range has 4 values; needed is 1 or 16"):
+    with pytest.raises(UserError, match="range has 4 values; it must have 1 or 16"):
         sensors(sonar_fmu=str(odd))
     make, good = sensors(sonar_fmu=str(odd), fmu_param=["beams.number=16"]), sensors(sonar_fmu=str(fmu("sonar", 3)))
     assert readings(make, paper, drive(30), "sonar") == readings(good, paper, drive(30), "sonar")
-    with pytest.raises(UserError, match="is of type UInt64, which does not have this value"):
+    with pytest.raises(UserError, match="is of type UInt64, which cannot hold this value"):
         sensors(sonar_fmu=str(odd), fmu_param=["beams.number=-1"])
 
 
@@ -467,18 +467,18 @@ def test_inputs_that_are_not_connected_and_arrays_get_start_values(fmu: Built, p
     ways = {'name="tau" valueReference="3" causality="parameter"': 'name="tau" valueReference="3" causality="input"'}
     ways |= {'variability="tunable"': 'variability="continuous"', 'unit="s"': ""}
     odd = altered(tmp_path / "odd.fmu", "lag", 3, code, ways)
-    with pytest.raises(UserError, match="which input it is, is not clear"):
+    with pytest.raises(UserError, match="it is not clear which input to use"):
         sensors(light_fmu=str(odd))
     for options in ({"fmu_param": ["tau=0.25"]}, {"fmu_param": ["tau=0.25"], "fmu_map": ["raw=u"]}):
         assert readings(sensors(light_fmu=str(odd), **options), paper, drive(20)) == [[0.25, 0.25]] * 20
-    with pytest.raises(UserError, match="tau is given our raw; it cannot have a value too"):
+    with pytest.raises(UserError, match="tau gets our raw, so --fmu-param cannot set it"):
         sensors(light_fmu=str(odd), fmu_param=["tau=0.25"], fmu_map=["raw=tau"])
     end = 'unit="m" variability="tunable"'
     sizes = {f'min="1e-06" {end} />': f'{end}><Dimension start="2"/></Float64>'}
     array = read(str(altered(tmp_path / "array.fmu", "sonar", 3, {}, sizes)))
     assert start_value(array, "resolution", "0.1, 0.2").values == [0.1, 0.2]
     assert start_value(array, "resolution", "0.1").values == [0.1, 0.1]
-    with pytest.raises(UserError, match="resolution has 2 values; give as many, or one for all"):
+    with pytest.raises(UserError, match="resolution has 2 values; give 2, or one for all"):
         start_value(array, "resolution", "1 2 3")
 
 
@@ -554,7 +554,7 @@ def test_connections_to_names_with_dots_and_equals_signs(fmu: Built, tmp_path: P
 
 def test_an_invalid_description_is_used_on_request(fmu: Built, tmp_path: Path, sensors, paper: Arena, capsys):
     odd = described(fmu("lag", 2), tmp_path / "a.fmu", 'generationTool="phototaxis"', 'generatedBy="phototaxis"')
-    with pytest.raises(UserError, match=r"is not valid: .*generatedBy.*; --allow-invalid uses it all the same"):
+    with pytest.raises(UserError, match=r"is not valid: .*generatedBy.*; to use it anyway, add --allow-invalid"):
         sensors(light_fmu=str(odd))
     found = readings(sensors(light_fmu=str(odd), allow_invalid=True), paper, drive(20))
     assert found == readings(sensors(light_fmu=str(fmu("lag", 2))), paper, drive(20))
@@ -591,7 +591,7 @@ def test_the_true_cause_of_a_file_that_cannot_be_used(fmu: Built, tmp_path: Path
 
     source, file = fmu("lag", 3), tmp_path / "odd.fmu"
     refused(edited(source, file, backslashes), r"wrongly packed: binaries\\x86_64-linux\\lag.so has backslashes")
-    refused(edited(source, file, inside), "it has no modelDescription.xml; lag/modelDescription.xml is not where it")
+    refused(edited(source, file, inside), "it has no modelDescription.xml; lag/modelDescription.xml has the wrong")
     refused(edited(source, file, latin), "its modelDescription.xml is not XML: .*bytes")
     with zipfile.ZipFile(edited(source, file, lambda name, data: (name, data)), "a") as archive:
         link = zipfile.ZipInfo("resources/table.csv")
@@ -600,6 +600,6 @@ def test_the_true_cause_of_a_file_that_cannot_be_used(fmu: Built, tmp_path: Path
     refused(file, "wrongly packed: resources/table.csv is a symbolic link")
     other = described(source, file, "CoSimulation", "ScheduledExecution")
     other = described(other, tmp_path / "b.fmu", ' canHandleVariableCommunicationStepSize="true"', "")
-    refused(other, "made for Scheduled Execution alone; needed is an FMU for Co-Simulation")
+    refused(other, "supports only Scheduled Execution; it must support Co-Simulation")
     file.write_bytes(bytes(range(256)) * 20)
     refused(file, "not an FMU: it is not a zip archive")

@@ -334,7 +334,7 @@ def test_more_steps_than_usual_are_given_as_gymnasium_has_it():
     assert gymnasium.spec("phototaxis/LightSeeker-v0").max_episode_steps == 300
     with pytest.raises(gymnasium.error.Error, match="max_episode_steps 0: an episode has at least one step"):
         gymnasium.make_vec(OURS, num_envs=2, max_episode_steps=0)
-    with pytest.raises(TypeError, match=r"max_episode_steps 2\.5: a whole number of steps is needed"):
+    with pytest.raises(TypeError, match=r"max_episode_steps 2\.5: it must be a whole number"):
         gymnasium.make_vec(OURS, num_envs=2, max_episode_steps=2.5)
 
 

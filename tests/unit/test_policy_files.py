@@ -127,7 +127,7 @@ def test_a_successor_inherits_the_memory(paper, tmp_path):
         np.testing.assert_array_equal(hidden, other)
     assert first.hidden is not None
     other = agent(save(PPO, tmp_path), paper)
-    with pytest.raises(UserError, match="first: its memory does not fit the policy in"):
+    with pytest.raises(UserError, match="first: its hidden state does not fit the policy in"):
         other.restore(*first.checkpoint(), "first")
 
 

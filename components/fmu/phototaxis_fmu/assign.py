@@ -1,4 +1,4 @@
-"""Which FMU an option NAME=VALUE is for, and where its name ends: variables may be called a.b or a=b."""
+"""Assigns each option NAME=VALUE to an FMU, and finds where NAME ends: a variable may be called a.b or a=b."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,12 +11,12 @@ Pairs = dict[str, dict[str, str]]
 
 
 def assign(maps: Sequence[str], parameters: Sequence[str], fmus: Mapping[str, Fmu]) -> tuple[Pairs, Pairs]:
-    """The --fmu-map and --fmu-param options of each FMU, by its kind.
+    """Return the --fmu-map and the --fmu-param pairs of each FMU, by its kind ("light" or "sonar").
 
     Raises
     ------
     UserError
-        when an option is no pair, or it is not clear for which FMU it is.
+        when an option is not NAME=VALUE, or does not say which FMU it is for.
     """
     ours = {port.name for suite in SUITES.values() for port in (*suite.inputs, suite.output)}
     known = {kind: {one.name for one in fmu.description.modelVariables} for kind, fmu in fmus.items()}
@@ -34,23 +34,23 @@ def _pairs(flag: str, items: Sequence[str], known: Mapping[str, set[str]]) -> Pa
 
 
 def _one(flag: str, item: str, known: Mapping[str, set[str]]) -> tuple[str, str, str]:
-    """The FMU's kind, the name and the value of one option."""
+    """Split one option into the FMU's kind, the name and the value."""
     splits = [(item[:at], item[at + 1 :]) for at, letter in enumerate(item) if letter == "=" and at]
     if not splits:
         raise UserError(f"--{flag} {item}: expected NAME=VALUE")
     only = next(iter(known)) if len(known) == 1 else ""
-    for name, value in reversed(splits):  # the longest name that there is
+    for name, value in reversed(splits):  # the longest known name first
         if only and name in known[only]:
             return only, name, value
         kind, _, rest = name.partition(".")
         if kind in known and rest in known[kind]:
             return kind, rest, value
-    name, value = splits[0]  # of an unknown name, which is refused where the FMU's own are listed
+    name, value = splits[0]  # the name is unknown; `connect` rejects it and lists the FMU's own names
     kind, dot, rest = name.partition(".")
     if dot and kind in known:
         return kind, rest, value
     if dot and kind in SUITES:
         raise UserError(f"--{flag} {item}: there is no --{kind}-fmu")
     if not only:
-        raise UserError(f"--{flag} {item}: of which FMU? say light.{name}=… or sonar.{name}=…")
+        raise UserError(f"--{flag} {item}: for which FMU? write light.{name}=… or sonar.{name}=…")
     return only, name, value

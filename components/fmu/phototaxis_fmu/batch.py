@@ -1,4 +1,4 @@
-"""FMUs as the sensors of many robots at once: all instances in one process, stepped together."""
+"""Uses FMUs as the sensors of many robots: all instances are stepped together, in one process where possible."""
 
 import numpy as np
 from phototaxis.wire.messages import World
@@ -10,12 +10,12 @@ from phototaxis_fmu.wiring import Wiring, size
 
 
 class InstanceBatch:
-    """The instances for one kind of sensor of N robots.
+    """Steps the instances for one kind of sensor of N robots.
 
     Parameters
     ----------
     stepped : the instances, robot by robot.
-    wiring : how one of them is connected.
+    wiring : the connections of one instance.
     """
 
     def __init__(self, stepped: Stepped, wiring: Wiring):
@@ -26,21 +26,21 @@ class InstanceBatch:
         self._offset = np.repeat([wire.offset for wire in wiring.inputs], sizes)
 
     def __call__(self, tick: int, ours: np.ndarray) -> np.ndarray | None:
-        """From the inputs of all instances to all outputs, robot by robot, in our units; None when it was given up."""
+        """Return the outputs of all instances, robot by robot, in our units; None after the FMU was given up."""
         inputs = ours.reshape(-1, len(self._factor)) * self._factor + self._offset
         outputs = self._stepped(0, tick, inputs.ravel().tolist())
         return None if outputs is None else np.array(outputs)
 
 
 class FmuBatch(BatchSuite):
-    """Readings of N robots, some of them from FMUs; for one episode, tick by tick."""
+    """Computes the readings of N robots, with FMUs for sonar, light or both; for one episode, tick by tick."""
 
     def __init__(self, world: World, sonar: InstanceBatch | None, light: InstanceBatch | None):
         super().__init__(world)
         self._sonar_instances, self._light_instances, self._tick = sonar, light, 0
 
     def __call__(self, tick: int, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Sonars (16, N) in m and lights (2, N) in 0..1 at poses (N, 3)."""
+        """Return sonars (16, N) in m and lights (2, N) in 0..1 at poses (N, 3)."""
         self._tick = tick
         return super().__call__(tick, poses)
 
@@ -63,7 +63,7 @@ class FmuBatch(BatchSuite):
         return np.clip(found.reshape(len(poses), 2, -1).sum(axis=2).T, 0.0, 1.0)
 
     def _sights(self, poses: np.ndarray, ports: list[str]) -> np.ndarray:
-        """What the instances see: (robot, sensor, lamp, port)."""
+        """Return the inputs of the instances, shape (robots, sensors, lamps, ports)."""
         lamps = []
         for light in self._arena.lights:
             east, north, distance, visible = self.sight(light, poses)

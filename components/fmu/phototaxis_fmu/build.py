@@ -1,4 +1,4 @@
-"""Makes FMUs: a model in C with its description, as sources, and the library for this machine from them."""
+"""Builds FMUs: packs a model in C with its description, and compiles the library for this machine."""
 
 import os
 import shutil
@@ -18,12 +18,12 @@ from phototaxis_fmu.examples import FOLDER, Example, Variable
 
 Version = Literal[2, 3]
 PLAIN_NAMES = [f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX" for version in (2, 3)]
-"""What the standard's headers want to hear when sources with a prefix of their own become a library."""
+"""Compiler flags that make the standard's headers leave out the function prefix that sources may define."""
 UNITS = {"m": {"m": "1"}, "rad": {"rad": "1"}, "s": {"s": "1"}, "1": {}}
 
 
 def build(example: Example, version: Version, file: Path, sources_only: bool = False) -> None:
-    """Write an FMU of an example for FMI 2.0 or 3.0; without `sources_only` it holds this machine's library.
+    """Write the FMU of an example for FMI 2.0 or 3.0, with this machine's library unless `sources_only`.
 
     Raises
     ------
@@ -50,12 +50,12 @@ def build(example: Example, version: Version, file: Path, sources_only: bool = F
 
 
 def compiled(file: Path) -> bytes:
-    """An FMU file with the library for this machine, made from its sources.
+    """Return the content of an FMU file, with the library for this machine compiled from its sources.
 
     Raises
     ------
     UserError
-        as in `compile_sources`.
+        as `compile_sources` does.
     """
     with TemporaryDirectory(prefix="phototaxis-fmu-") as folder:
         archive = Path(shutil.copyfile(file, Path(folder) / "compiled.fmu"))
@@ -64,14 +64,14 @@ def compiled(file: Path) -> bytes:
 
 
 def compile_sources(archive: Path) -> None:
-    """Add the library for this machine, made from its sources, to an FMU file.
+    """Compile the sources of an FMU file for this machine, and add the library to the file.
 
     Raises
     ------
     UserError
-        when the C compiler is missing or does not accept the sources.
+        when the C compiler is missing or rejects the sources.
     """
-    beside = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])  # cmake is there
+    beside = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])  # cmake is beside python
     flags = {name: " ".join([os.environ.get(name, ""), *PLAIN_NAMES]).strip() for name in ("CFLAGS", "CXXFLAGS")}
     command = [sys.executable, "-m", "fmpy", "compile", archive, "--generator", "Unix Makefiles"]
     environment = os.environ | flags | {"PATH": beside}
@@ -83,7 +83,7 @@ def compile_sources(archive: Path) -> None:
 
 
 def _names(example: Example) -> str:
-    """names.h, for the model alone: `m->v[0]` is the time, the others follow."""
+    """Return names.h, which only the model includes: it names each variable; `m->v[0]` is the time."""
     lines = ['#include "model.h"', ""]
     for variable, reference in _references(example):
         place = f"m->v + {reference}" if variable.size > 1 else f"m->v[{reference}]"
@@ -92,7 +92,7 @@ def _names(example: Example) -> str:
 
 
 def _variables(example: Example, token: str) -> str:
-    """variables.h, for the wrapper."""
+    """Return variables.h, which the wrapper includes: token, start values and sizes of all variables."""
     starts, sizes = ["0"], ["1"]
     for variable, _ in _references(example):
         starts += [repr(variable.start or 0.0)] * variable.size
@@ -133,7 +133,7 @@ def _attributes(variable: Variable) -> dict[str, str]:
 
 
 def _fmi2(example: Example, token: str) -> ET.Element:
-    """An array becomes scalars NAME[1], NAME[2], …."""
+    """Return modelDescription.xml for FMI 2.0, in which an array becomes scalars NAME[1], NAME[2], …."""
     root = _description(example, "2.0", guid=token)
     interface = ET.SubElement(root, "CoSimulation", _interface(example, "FMUstate"))
     files = ET.SubElement(interface, "SourceFiles")

@@ -1,4 +1,4 @@
-"""`phototaxis fmu`: what is in an FMU, does it work as a sensor, and the shipped examples."""
+"""`phototaxis fmu`: shows what is in an FMU, tests it as a sensor, and builds the shipped examples."""
 
 import json
 import sys
@@ -19,9 +19,9 @@ class Info(Struct, kw_only=True):
     file: str
     """the FMU"""
     allow_invalid: bool = False
-    """show an FMU whose description fails the validation against the standard's schema"""
+    """show an FMU even if its description does not follow the standard's schema"""
     json: bool = False
-    """print it as one JSON object"""
+    """print the result as one JSON object"""
 
 
 class Check(Struct, kw_only=True):
@@ -30,24 +30,24 @@ class Check(Struct, kw_only=True):
     file: str
     """the FMU"""
     kind: Literal["light", "sonar", "any"] = "any"
-    """what it is to be; any: whatever it fits"""
+    """sensor to test the FMU as; any: each one that it fits"""
     fmu_map: list[str] = []
-    """OUR=THEIRS: our input or output is the FMU's variable of another name (may be repeated)"""
+    """OUR=THEIRS: connect our input or output OUR to the FMU's variable THEIRS (may be repeated)"""
     fmu_param: list[str] = []
-    """NAME=VALUE: the start value of a parameter of the FMU, or of an input that is not connected; of an array
-    VALUE,VALUE,… (may be repeated)"""
+    """NAME=VALUE: start value of a parameter of the FMU, or of an input that is not connected; VALUE,VALUE,… for an
+    array (may be repeated)"""
     fmu_step: Annotated[float, Meta(ge=0)] = 0.0
-    """seconds of one step of the FMU, of which half a second is a whole number; 0: as the FMU's description wants it"""
+    """step size of the FMU, s; half a second must be a whole number of steps; 0: as the FMU's description asks"""
     fmu_fresh: bool = False
     """begin each episode with a fresh instance of the FMU, in place of a reset"""
     fmu_log: bool = False
-    """show more of what the FMU says than its first lines"""
+    """show all output of the FMU, not only its first lines"""
     fmu_timeout: Annotated[float, Meta(gt=0)] = 5.0
-    """seconds after which an FMU that does not answer is ended"""
+    """seconds after which an FMU that does not answer is killed"""
     allow_compile: bool = False
-    """compile an FMU that comes as C source alone: this runs its author's build"""
+    """compile an FMU that contains only C sources; this runs its author's build"""
     allow_invalid: bool = False
-    """use an FMU whose description fails the validation against the standard's schema"""
+    """use an FMU even if its description does not follow the standard's schema"""
     json: bool = False
     """print the result as one JSON object"""
 
@@ -56,13 +56,13 @@ class Build(Struct, kw_only=True):
     """Options of `phototaxis fmu build`."""
 
     name: str
-    """which example: light, lag, photodiode, sonar"""
+    """name of the example: light, lag, photodiode, sonar"""
     fmi: Literal[2, 3] = 3
     """version of FMI: 2 or 3"""
     output: str = ""
     """file to write (default: NAME.fmu)"""
     sources_only: bool = False
-    """leave this machine's library out; whoever uses it compiles it"""
+    """leave out this machine's library; the user of the FMU compiles it"""
 
 
 def main(argv: Sequence[str]) -> int:
@@ -77,8 +77,8 @@ def main(argv: Sequence[str]) -> int:
 
 
 def info(argv: Sequence[str]) -> int:
-    """Variables, units, causality, platforms, and what maps onto what."""
-    about = "Show what is in an FMU and how it would be connected, without running any of it."
+    """Print variables, units, causality and platforms of an FMU, and which variables connect to our quantities."""
+    about = "Show what is in an FMU and how it would be connected, without running its code."
     options = parse(Info, argv, "phototaxis fmu info", about, positional=["file"])
     from phototaxis_fmu.description import read
     from phototaxis_fmu.report import describe, text
@@ -89,8 +89,8 @@ def info(argv: Sequence[str]) -> int:
 
 
 def check(argv: Sequence[str]) -> int:
-    """Validation, then a dry run with the FMU's logging on."""
-    about = "Validate an FMU and drive a robot about with it: does it load, step, reset and repeat itself?"
+    """Validate an FMU, then run it as a sensor with its logging on."""
+    about = "Validate an FMU and drive a robot with it, to test that it loads, steps, resets and repeats its readings."
     options = parse(Check, argv, "phototaxis fmu check", about, positional=["file"])
     from fmpy.validation import validate_fmu
 
@@ -102,7 +102,7 @@ def check(argv: Sequence[str]) -> int:
     fmu = read(options.file, options.allow_invalid)
     remarks = validate_fmu(options.file)
     for remark in remarks:
-        print(f"{options.file}: not as the standard has it: {remark}", file=sys.stderr)
+        print(f"{options.file}: does not follow the standard: {remark}", file=sys.stderr)
     kinds = [options.kind] if options.kind != "any" else [k for k in SUITES if connection(fmu, SUITES[k])["fits"]]
     if not kinds and options.fmu_map:
         raise UserError(f"{options.file}: say what --fmu-map is for: --kind light or --kind sonar")
@@ -117,7 +117,7 @@ def check(argv: Sequence[str]) -> int:
             sensors.close()
         if not options.json:
             print("{kind}: {ticks} ticks in {episodes} episodes, readings {low:.3g} to {high:.3g}, "
-                  "{microseconds:.0f} µs a tick; the same again after {begins}".format(**results[-1]))  # fmt: skip
+                  "{microseconds:.0f} µs a tick; repeated exactly after {begins}".format(**results[-1]))  # fmt: skip
     if options.json:
         print(json.dumps({"file": options.file, "remarks": remarks, "runs": results}))
     return 0

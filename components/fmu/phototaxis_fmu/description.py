@@ -1,4 +1,4 @@
-"""Reads an FMU and says clearly what is wrong with it, before any of its code runs."""
+"""Reads and checks an FMU's description before any of its code runs."""
 
 import stat
 import sys
@@ -19,13 +19,13 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] - it has n
 from phototaxis.runtime.errors import UserError
 
 MAX_UNPACKED_BYTES = 2_000_000_000
-"""Bytes that an FMU may have when unpacked."""
+"""The largest size of an FMU when unpacked, bytes."""
 UNPACKING_ERRORS = (zipfile.BadZipFile, zlib.error, RuntimeError, OSError)
-"""What a damaged, an encrypted or an exotic archive, or a full disk, raises."""
+"""Errors that a damaged, encrypted or unusual archive, or a full disk, raises."""
 
 
 class Fmu(NamedTuple):
-    """An FMU that this machine can run, or could after compiling it."""
+    """An FMU file and its description."""
 
     file: Path
     version: int
@@ -33,13 +33,13 @@ class Fmu(NamedTuple):
     description: ModelDescription
     interface: CoSimulation
     library: str
-    """Path of its library inside the archive."""
+    """Path of this machine's library inside the archive."""
     platforms: list[str]
-    """Platforms that it has a library for."""
+    """Platforms for which the archive has a library."""
     sources: bool
-    """Whether it has C sources."""
+    """Whether the archive has C sources."""
     compiled: bool
-    """Whether it has a library for this machine."""
+    """Whether the archive has a library for this machine."""
 
     @property
     def name(self) -> str:
@@ -47,15 +47,15 @@ class Fmu(NamedTuple):
 
     @property
     def once(self) -> bool:
-        """Whether a process can have only one instance of it."""
+        """Whether a process can have only one instance of the FMU."""
         return self.interface.canBeInstantiatedOnlyOncePerProcess
 
     def variable(self, name: str) -> ModelVariable | None:
-        """The variable of that name."""
+        """Return the variable of that name, or None."""
         return next((one for one in self.description.modelVariables if one.name == name), None)
 
     def listed(self, *causalities: str) -> str:
-        """The first variables of some causalities, for a message."""
+        """Return the names of the first variables of some causalities, for a message."""
         names = [one.name for one in self.description.modelVariables if one.causality in causalities]
         return ", ".join([*names[:8], *(["…"] if len(names) > 8 else [])]) or "none"
 
@@ -63,12 +63,12 @@ class Fmu(NamedTuple):
 def read(path: str, allow_invalid: bool = False) -> Fmu:
     """Read an FMU's description without running or unpacking anything.
 
-    With `allow_invalid` one that is not as the standard's schema has it is said to be so, and used.
+    With `allow_invalid`, a description that does not follow the standard's schema is used too, with a warning.
 
     Raises
     ------
     UserError
-        with one line that says what is wrong.
+        when the FMU cannot be used; the text is one line that says why.
     """
     file = Path(path)
     try:
@@ -95,7 +95,7 @@ def read(path: str, allow_invalid: bool = False) -> Fmu:
     if interface is None:
         others = {"Model Exchange": description.modelExchange, "Scheduled Execution": description.scheduledExecution}
         made = " and ".join(name for name, other in others.items() if other is not None) or "no kind of simulation"
-        raise UserError(f"{path}: made for {made} alone; needed is an FMU for Co-Simulation")
+        raise UserError(f"{path}: supports only {made}; it must support Co-Simulation")
     place = fmpy.platform if version == 2 else fmpy.platform_tuple
     library = f"binaries/{place}/{interface.modelIdentifier}{fmpy.sharedLibraryExtension}"
     parts = [member.split("/") for member in members]
@@ -109,14 +109,14 @@ def _well_packed(path: str, archive: zipfile.ZipFile) -> None:
     for one in members:
         if "\\" in one.orig_filename:
             raise UserError(
-                f"{path}: wrongly packed: {one.orig_filename} has backslashes, which no archive of an FMU may"
+                f"{path}: wrongly packed: {one.orig_filename} has backslashes; paths in an FMU must have slashes"
             )
         if stat.S_ISLNK(one.external_attr >> 16):
             raise UserError(f"{path}: wrongly packed: {one.filename} is a symbolic link; pack the file itself")
     names = [one.filename for one in members]
     if "modelDescription.xml" not in names:
         deeper = next((name for name in names if name.lower().split("/")[-1] == "modeldescription.xml"), "")
-        there = f"; {deeper} is not where it belongs, or not its name" if deeper else ""
+        there = f"; {deeper} has the wrong place or name" if deeper else ""
         raise UserError(f"{path}: not an FMU: it has no modelDescription.xml{there}")
 
 
@@ -127,7 +127,7 @@ def _version(path: str, archive: zipfile.ZipFile) -> int:
     except etree.XMLSyntaxError as error:
         raise UserError(f"{path}: its modelDescription.xml is not XML: {error.msg}") from None
     if said != "2.0" and not said.startswith("3."):
-        raise UserError(f"{path}: its FMI version is {said}; needed is 2.0 or 3.0")
+        raise UserError(f"{path}: its FMI version is {said}; it must be 2.0 or 3.0")
     return int(said[0])
 
 
@@ -139,17 +139,17 @@ def _describe(path: str, allow_invalid: bool) -> ModelDescription:
             problem, more = error.problems[0], len(error.problems) - 1
             line = f"{path}: its modelDescription.xml is not valid: {problem}{f' (and {more} more)' if more else ''}"
             if not allow_invalid:
-                raise UserError(f"{line}; --allow-invalid uses it all the same") from None
-            print(f"sensors: {line}; it is used all the same", file=sys.stderr, flush=True)
+                raise UserError(f"{line}; to use it anyway, add --allow-invalid") from None
+            print(f"sensors: {line}; it is used anyway", file=sys.stderr, flush=True)
             return _sound(read_model_description(path, validate=False))
     except UserError:
         raise
-    except Exception as error:  # fmpy raises bare ones
+    except Exception as error:  # fmpy raises plain Exceptions
         raise UserError(f"{path}: its modelDescription.xml cannot be used: {' '.join(str(error).split())}") from None
 
 
 def _sound(description: ModelDescription) -> ModelDescription:
-    """A description that no schema has approved; raises ValueError where what is used of it is no number."""
+    """Return an unvalidated description; ValueError when one of the fields that we use as numbers is not a number."""
     experiment, interface = description.defaultExperiment, description.coSimulation
     numbers = [experiment.stepSize] if experiment is not None else []
     numbers += [interface.fixedInternalStepSize] if interface is not None else []
@@ -161,7 +161,7 @@ def _sound(description: ModelDescription) -> ModelDescription:
 
 
 def require_library(fmu: Fmu, allow_compile: bool) -> None:
-    """Raise UserError unless this machine can run it, after compiling it where that is allowed."""
+    """Raise UserError unless this machine can run the FMU, or may compile it (`allow_compile`)."""
     if fmu.compiled:
         return
     if fmu.sources and allow_compile:
@@ -169,8 +169,8 @@ def require_library(fmu: Fmu, allow_compile: bool) -> None:
             raise UserError(f"{fmu.file}: has C sources, but does not say which of them to compile")
         return
     if fmu.sources and not fmu.platforms:
-        raise UserError(f"{fmu.file}: has C sources alone; add --allow-compile to build it here")
+        raise UserError(f"{fmu.file}: has only C sources; add --allow-compile to build it here")
     here = fmu.library.split("/")[1]
-    others = f"only for {', '.join(fmu.platforms)}" if fmu.platforms else "nor any other, nor C sources"
+    others = f"only for {', '.join(fmu.platforms)}" if fmu.platforms else "no other library and no C sources"
     compile_it = "; it has C sources: add --allow-compile to build it here" if fmu.sources else ""
     raise UserError(f"{fmu.file}: has no library {fmu.library} for this machine ({here}), {others}{compile_it}")

@@ -1,4 +1,4 @@
-"""The parent of a worker: unpacks an FMU, has its instances stepped in another process, and watches over it."""
+"""The parent side of a worker: unpacks an FMU, steps its instances in another process, and supervises that process."""
 
 import os
 import select
@@ -25,17 +25,18 @@ from phototaxis_fmu.worker import BEGIN, FAILED, HEAD, LENGTH, REPLACED, STEP
 LOADING_S = 30.0
 """Seconds that an FMU may take to be loaded."""
 LOOK_EVERY_S = 0.1
-"""Seconds after which a silent worker is looked at: a helper of the FMU may hold its pipes when it is dead."""
+"""Seconds between two checks whether a silent worker still lives: a helper process of the FMU may keep the pipes of
+a dead worker open."""
 GUARD = 'read -r _; rm -rf -- "$2"; kill -s KILL -- "-$1"; rm -rf -- "$2"'
-"""A shell that waits until its parent is gone, however it went: then it removes a folder and ends a
-process group, which may have used the folder until then."""
+"""A shell script that waits until its parent has ended, even by a crash; then it removes a folder and kills a process
+group. It removes the folder twice, since the group may have written into it meanwhile."""
 
 
 def stay_on_one_cpu() -> None:
     """Keep this thread, and the processes that it starts, on one CPU.
 
-    An FMU and its parent never compute at the same time, and to wake a process on the same CPU takes a tenth of
-    the time: measured 6 µs in place of 47 there and back.
+    An FMU and its parent never compute at the same time, and waking a process on the same CPU is faster: a measured
+    round trip took 6 µs instead of 47 µs.
     """
     if hasattr(os, "sched_setaffinity"):
         allowed = sorted(os.sched_getaffinity(0))
@@ -43,15 +44,15 @@ def stay_on_one_cpu() -> None:
 
 
 class Failed(Exception):
-    """The FMU crashed, hung, or said that it cannot go on."""
+    """The FMU crashed, hung, or reported an error."""
 
 
 class Killed(Failed):
-    """Somebody else has ended its process."""
+    """Somebody else has killed the FMU's process."""
 
 
 class Terms(NamedTuple):
-    """What is the same for all processes of an FMU."""
+    """The settings that all processes of an FMU share."""
 
     fmu: Fmu
     wiring: Wiring
@@ -60,22 +61,22 @@ class Terms(NamedTuple):
     timeout: float = 5.0
     """Seconds after which a silent process is killed."""
     fresh: bool = False
-    """Each episode gets a fresh instance in place of a reset."""
+    """Whether each episode gets a fresh instance instead of a reset."""
     archive: bytes | None = None
-    """The FMU's archive where it is not that of its file."""
+    """The FMU's archive if it was compiled here; None: it is the file itself."""
 
 
 class Host:
-    """Instances of one FMU in a process of their own.
+    """Runs instances of one FMU in a process of their own.
 
     Parameters
     ----------
-    terms : what is run, and how.
-    instances : how many; all are stepped together.
+    terms : the FMU, its wiring and its settings.
+    instances : number of instances; all are stepped together.
 
     Attributes
     ----------
-    begins : what episodes begin with: "a reset", "a fresh instance", "a fresh process".
+    begins : how an episode begins: with "a reset", "a fresh instance" or "a fresh process".
     """
 
     def __init__(self, terms: Terms, instances: int):
@@ -94,12 +95,12 @@ class Host:
         self._logging = terms.log.everything
 
     def start(self, logging: bool = False) -> None:
-        """Load the FMU in a fresh process; with `logging` its logging is on from now on.
+        """Load the FMU in a fresh process; with `logging`, its logging is on from now on.
 
         Raises
         ------
         Failed
-            when it cannot be loaded.
+            when the FMU cannot be loaded.
         """
         self.stop()
         self._logging |= logging
@@ -115,7 +116,7 @@ class Host:
             stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         to, answers, says = self._process.stdin, self._process.stdout, self._process.stderr
-        assert to and answers and says  # noqa: S101, PT018 - said to the type checker: all are pipes
+        assert to and answers and says  # noqa: S101, PT018 - tells the type checker that all are pipes
         self._listener = Listener(says, self._terms.log)
         self._to, self._from = to.fileno(), answers.fileno()
         self._poll = select.poll()
@@ -125,14 +126,14 @@ class Host:
         self._read(HEAD.size, LOADING_S)
 
     def begin(self, inputs: Sequence[float]) -> None:
-        """Begin an episode with these inputs: reset all instances, or what serves in its place.
+        """Begin an episode with these inputs: reset or replace all instances.
 
-        An FMU that cannot be reset gets a fresh instance, and one that dies of it a fresh process.
+        An instance that cannot be reset is replaced by a fresh one; if the FMU dies of it, by a fresh process.
 
         Raises
         ------
         Failed
-            when a fresh one does not serve either.
+            when the fresh process fails too.
         """
         if self._begun and self.begins == "a fresh process":
             self.start()
@@ -149,18 +150,18 @@ class Host:
             self._cannot_be_reset(str(why), "a fresh process")
 
     def step(self, inputs: Sequence[float], count: int = 1) -> tuple[float, ...]:
-        """Step all instances by `count` periods; their outputs, one instance after the other.
+        """Step all instances by `count` control periods, and return their outputs, instance by instance.
 
         Raises
         ------
         Failed
-            when it does not answer, or says that it failed; the process is then ended.
+            when the FMU does not answer, or reports an error; its process is then ended.
         """
         self._write(self._request.pack(STEP, count, *inputs))
         return self._answer.unpack(self._read(self._answer.size, self._terms.timeout))[2:]
 
     def stop(self) -> None:
-        """End the process, and all that it has started, and remove what was unpacked."""
+        """End the process and all processes that it has started, and remove the unpacked files."""
         process, self._process = self._process, None
         if process is not None:
             for stream in (process.stdin, process.stdout):
@@ -183,7 +184,7 @@ class Host:
 
     @property
     def pid(self) -> int:
-        """Of the process; 0 when there is none."""
+        """The process id; 0 when there is no process."""
         return 0 if self._process is None else self._process.pid
 
     def _setup(self, folder: str) -> InstanceSetup:
@@ -200,7 +201,7 @@ class Host:
         archive = self._terms.archive
         try:
             with zipfile.ZipFile(self._terms.fmu.file if archive is None else BytesIO(archive)) as members:
-                members.extractall(folder)  # it strips what would lead out of the folder
+                members.extractall(folder)  # it drops the parts of a path that lead out of the folder
         except UNPACKING_ERRORS as error:
             raise Failed(f"cannot be unpacked: {error}") from None
 
@@ -218,7 +219,7 @@ class Host:
             while data:
                 data = data[os.write(self._to, data) :]
         except BrokenPipeError:
-            self._read(HEAD.size, self._terms.timeout)  # its last words, or the way it died
+            self._read(HEAD.size, self._terms.timeout)  # raises Failed with the reason that the worker gave or left
 
     def _read(self, size: int, timeout: float) -> bytes:
         answer, left = b"", timeout
@@ -259,17 +260,17 @@ class Host:
         return (Killed if code == -signal.SIGKILL else Failed)(self._end(how))
 
     def _end(self, why: str) -> str:
-        """End a process that failed; why it did, and what it said last."""
+        """End a process that failed, and return why it failed, with the last line of its output."""
         if self._process is not None:
             self._process.kill()
         listener = self._listener
         self.stop()
         words = listener.last if listener is not None else ""
-        return why if not words or words in why else f"{why}; its last words: {words}"
+        return why if not words or words in why else f"{why}; its last output: {words}"
 
 
 class Team:
-    """Instances of an FMU of which a process can have only one: a process each; otherwise as a `Host`."""
+    """Runs instances of an FMU that allows one instance per process: one `Host` for each, and used like a `Host`."""
 
     def __init__(self, members: Sequence[Host]):
         self._members = members
@@ -304,7 +305,7 @@ def _end(wire: Wire) -> tuple[str, int, int]:
 
 
 def _end_group(leader: "subprocess.Popen[bytes]") -> None:
-    """End a process and all processes of its group; the leader may have ended by itself."""
+    """Kill a process and all processes of its group; the leader may have ended by itself."""
     with suppress(ProcessLookupError, PermissionError):
         os.killpg(leader.pid, signal.SIGKILL)
     leader.wait()

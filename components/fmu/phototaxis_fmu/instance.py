@@ -1,4 +1,4 @@
-"""One instance of an FMU as the worker uses it: begun, stepped, begun anew, replaced by a fresh one."""
+"""Runs one instance of an FMU inside the worker: begins episodes, steps it, and replaces it if a reset fails."""
 
 import ctypes
 import os
@@ -14,33 +14,35 @@ from phototaxis_fmu.log import MARK, one_line
 STATUS = ("OK", "a warning", "discard", "an error", "a fatal error", "pending")
 WARNING, FATAL = 1, 4
 TOLD = 2 * 1000
-"""Most messages of the FMU's logger that are passed on; no more would be shown."""
+"""Most messages of the FMU's logger that the worker passes on; the parent shows fewer."""
 
 
 class Ends(msgspec.Struct):
-    """The variables of one type among an instance's inputs or outputs, in their order."""
+    """Consecutive inputs or outputs of an instance that have the same type."""
 
     kind: str
+    """The FMI type, as in "Float64"."""
     references: list[int]
-    """Value references; with arrays they are fewer than the values."""
+    """Value references; an array has one reference for several values."""
     values: int
+    """Number of values."""
 
 
 class Parameter(msgspec.Struct):
-    """Start values of one variable."""
+    """The start values of one variable."""
 
     kind: str
     reference: int
     values: list[int | float | bool | str]
     structural: bool = False
-    """It may change the sizes of other variables: set in configuration mode."""
+    """Whether it can change the sizes of other variables, and is set in configuration mode."""
 
 
 class InstanceSetup(msgspec.Struct):
-    """What the parent tells the worker first."""
+    """The first message from the parent to the worker: which FMU to load, and how to run it."""
 
     folder: str
-    """Of the unpacked FMU."""
+    """Folder of the unpacked FMU."""
     version: int
     identifier: str
     token: str
@@ -53,31 +55,31 @@ class InstanceSetup(msgspec.Struct):
     times: int
     """Steps in a control period."""
     fresh: bool
-    """Each episode gets a fresh instance, without trying to reset the last one."""
+    """Whether each episode gets a fresh instance, without an attempt to reset the last one."""
     once: bool
-    """A process can have one instance, and no second one after it."""
+    """Whether a process can create only one instance in its whole life."""
     logging: bool
-    """The FMU's logging is on."""
+    """Whether the FMU's logging is on."""
     least: int
-    """Status from which on the FMU's messages are passed on."""
+    """Lowest status of log messages that the worker passes on."""
 
 
 class Broken(Exception):
-    """The FMU refuses to go on; the text says why."""
+    """The FMU cannot be loaded or go on; the text says why."""
 
 
 class Voice:
-    """What the FMU logs: all of it goes to the parent, and the worst since the last request is kept as the reason."""
+    """Passes the FMU's log messages on to the parent, and keeps the worst since the last request as the reason."""
 
     def __init__(self, least: int):
         self._least, self._left, self._worst, self.reason = least, TOLD, 0, ""
 
     def forget(self) -> None:
-        """A new request begins."""
+        """Drop the reason, since a new request begins."""
         self._worst, self.reason = 0, ""
 
     def hear(self, status: int, message: bytes | None) -> None:
-        """Called by the FMU."""
+        """Take a log message; the FMU calls this."""
         if status and status >= self._worst:
             self._worst, self.reason = status, one_line(message or b"")
         if status >= self._least and self._left:
@@ -87,26 +89,27 @@ class Voice:
 
 
 class Part(NamedTuple):
-    """A run of inputs or outputs of one type, and the call that sets or gets them."""
+    """Consecutive inputs or outputs of one type, and the FMI function that sets or gets them."""
 
     name: str
     call: Callable[..., int]
     arguments: tuple[Any, ...]
-    """After the instance: value references, their number, values, and for FMI 3 the number of values."""
+    """Arguments after the instance: value references, their number, values, and for FMI 3 the number of values."""
     values: Any
+    """The values in the FMU's own type."""
     doubles: Any
-    """None where `values` are the doubles themselves."""
+    """The same values in the buffer of doubles; None if `values` are in that buffer themselves."""
 
 
 class Instance:
-    """One instance of the FMU, whose inputs and outputs are parts of the buffers.
+    """One instance of the FMU; its inputs and outputs are slices of buffers that all instances share.
 
     Parameters
     ----------
-    setup : what is run.
-    number : of the instance.
-    inputs, outputs : buffers of doubles, and where in them the instance's own begin (bytes).
-    voice : hears what the FMU logs.
+    setup : the FMU and how to run it.
+    number : number of the instance, from 0.
+    inputs, outputs : the shared buffers of doubles, and the offset of the instance's slice in bytes.
+    voice : receives the FMU's log messages.
     """
 
     def __init__(
@@ -125,9 +128,9 @@ class Instance:
         self._outputs = self._parts("Get", setup.outputs, *outputs)
 
     def begin(self) -> str:
-        """Time 0, with the inputs that are there.
+        """Begin an episode at time 0, with the inputs in the buffer.
 
-        Returns why the instance could not be reset, so that a fresh one serves; "" where it could.
+        Returns why the instance could not be reset and was replaced by a fresh one; "" if it was reset.
         """
         from fmpy.fmi1 import FMICallException
 
@@ -154,7 +157,7 @@ class Instance:
         return why
 
     def step(self, count: int) -> None:
-        """So many control periods on, with the inputs that are there; then the outputs are."""
+        """Step by `count` control periods with the inputs in the buffer, and put the outputs into theirs."""
         self._feed()
         fmu, step = self._fmu, self._setup.step
         for _ in range(count * self._setup.times):
@@ -169,7 +172,7 @@ class Instance:
                 doubles[:] = values[:]
 
     def end(self) -> None:
-        """Terminate and free it."""
+        """Terminate and free the instance."""
         self._fmu.terminate()
         self._free()
 
@@ -204,7 +207,7 @@ class Instance:
                 raise self._refused(name, status)
 
     def _free(self) -> None:
-        """Free the instance and keep the library: to load it again and again leaks, or crashes."""
+        """Free the instance but keep the library, because loading a library repeatedly leaks memory or crashes."""
         component, self._fmu.component = self._fmu.component, None
         getattr(self._fmu, f"fmi{self._setup.version}FreeInstance")(component)
 
@@ -224,7 +227,7 @@ class Instance:
             references = (ctypes.c_uint * len(end.references))(*end.references)
             more = () if self._setup.version == 2 else (end.values,)
             name = f"fmi{self._setup.version}{verb}{end.kind}"
-            call = getattr(self._fmu.dll, name)  # whose types fmpy has declared; its own way to call takes longer
+            call = getattr(self._fmu.dll, name)  # called directly, with types from fmpy, as fmpy's wrappers are slower
             arguments = references, len(references), values, *more
             found.append(Part(name, call, arguments, values, doubles if single else None))
         return found
@@ -240,7 +243,7 @@ class Instance:
             )  # fmt: skip
         except AttributeError as error:
             raise Broken(f"its library lacks a function: {str(error).split(': ')[-1]}") from None
-        except Exception as error:  # fmpy raises bare ones
+        except Exception as error:  # fmpy raises plain Exceptions
             raise Broken(f"its library cannot be loaded: {str(error).split('. ', 1)[-1]}") from None
 
     def _instantiate(self) -> None:
@@ -257,19 +260,19 @@ class Instance:
                 )
         except FMICallException:
             raise
-        except Exception:  # fmpy raises bare ones
+        except Exception:  # fmpy raises plain Exceptions
             if self._setup.logging or self._voice.reason:
                 raise Broken("cannot be instantiated") from None
-            self._setup.logging = True  # once more, to hear why
+            self._setup.logging = True  # try once more with logging, to learn why
             self._instantiate()
             return
         if self._setup.logging:
             with suppress(FMICallException):
-                self._fmu.setDebugLogging(True, [])  # of every category; to name them would leave out what has none
+                self._fmu.setDebugLogging(True, [])  # all categories; a list of them would drop messages without one
 
 
 def _callbacks2(voice: Voice) -> Any:
-    """The functions that an FMU of FMI 2 may call; its messages come formatted, as printf does it."""
+    """Return the functions that an FMI 2 FMU may call; the logger gets messages that are already formatted."""
     from fmpy import calloc, fmi2, free
 
     calls = fmi2.fmi2CallbackFunctions()
@@ -281,7 +284,7 @@ def _callbacks2(voice: Voice) -> Any:
 
 
 def explain(error: Exception, voice: Voice) -> str:
-    """An error in words, with what the FMU said of it."""
+    """Describe an error in words, with the reason that the FMU logged."""
     status = getattr(error, "status", None)
     text = str(error)
     if status is not None:
@@ -292,7 +295,7 @@ def explain(error: Exception, voice: Voice) -> str:
 
 
 def ends(variables: Sequence[tuple[str, int, int]]) -> list[Ends]:
-    """The variables (type, value reference, number of values) of an instance as runs of one type."""
+    """Group consecutive variables (type, value reference, number of values) of the same type."""
     found = []
     for kind, run in groupby(variables, key=lambda one: one[0]):
         members = list(run)

@@ -1,4 +1,7 @@
-"""fmpy's libraries of FMUs, which may have the prefix that the standard has for sources: MODEL_fmi3DoStep."""
+"""Loads the libraries of FMUs with fmpy, also those whose functions have a prefix, as in MODEL_fmi3DoStep.
+
+The standard has this prefix for FMUs in source form, but some libraries have it too.
+"""
 
 import ctypes
 from typing import Any
@@ -8,7 +11,7 @@ from fmpy.fmi3 import FMU3Slave
 
 
 class _Prefixed:
-    """A library whose functions are called by their plain names."""
+    """Lets fmpy call the prefixed functions of a library by their plain names."""
 
     def __init__(self, library: ctypes.CDLL, prefix: str):
         self._library, self._prefix, self._handle = library, prefix, library._handle
@@ -24,7 +27,7 @@ def _plain(library: ctypes.CDLL, identifier: str, version: int) -> Any:
 
 
 class FMU2Library(FMU2Slave):
-    """An FMU of FMI 2.0."""
+    """The library of an FMU for FMI 2.0."""
 
     def _loadFunctions(self) -> None:
         self.dll = _plain(self.dll, self.modelIdentifier, 2)
@@ -32,7 +35,7 @@ class FMU2Library(FMU2Slave):
 
 
 class FMU3Library(FMU3Slave):
-    """An FMU of FMI 3.0."""
+    """The library of an FMU for FMI 3.0."""
 
     def _loadFunctions(self) -> None:
         self.dll = _plain(self.dll, self.modelIdentifier, 3)

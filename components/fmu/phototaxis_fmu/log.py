@@ -1,4 +1,4 @@
-"""What an FMU says, logged or printed: one line each, for the user, and no more than a person can read."""
+"""Shows the user what an FMU logs or prints: one line for each message, and only as many as a person can read."""
 
 import os
 import sys
@@ -7,20 +7,20 @@ from contextlib import suppress
 from typing import IO
 
 MAX_LINES, MAX_LINES_ON_REQUEST = 20, 1000
-"""Most lines of an FMU that are shown: without and with its logging on."""
+"""Most lines of an FMU that are shown, without and with --fmu-log."""
 MAX_LINE_CHARACTERS = 600
-"""Most characters of a line; a longer one loses its middle."""
+"""Most characters of a line; the middle of a longer line is left out."""
 MAX_LINE_BYTES = 8 * MAX_LINE_CHARACTERS
-"""Most bytes of a line that are looked at."""
+"""Most bytes of a line that are decoded."""
 READ_BYTES = 65536
 """Bytes that are read at once."""
 MARK = b"\x1e"
-"""Begins a line of the FMU's logger, before its status; other lines were printed."""
+"""Begins a line of the FMU's logger, and precedes its status; a line without it was printed by the FMU."""
 STATUS = ("info", "warning", "discard", "error", "fatal error", "pending")
 
 
 def one_line(said: bytes) -> str:
-    """Whatever an FMU says, as one printable line of bounded length."""
+    """Convert any output of an FMU to one printable line of bounded length."""
     if len(said) > MAX_LINE_BYTES:
         said = said[: MAX_LINE_BYTES // 2] + said[-MAX_LINE_BYTES // 2 :]
     words = " ".join(said.decode(errors="replace").split())
@@ -33,13 +33,13 @@ def one_line(said: bytes) -> str:
 
 
 class Log:
-    """Shows on standard error what an FMU says, up to a number of lines; the same line again is not shown.
+    """Shows the output of an FMU on standard error, up to a number of lines; a repeated line is shown once.
 
     Parameters
     ----------
     label : names the FMU, as in "light FMU lag.fmu".
-    everything : its logging is on from the beginning, and what is no warning is shown too.
-    most : number of lines.
+    everything : whether its logging is on from the beginning, and messages below a warning are shown too.
+    most : most lines to show.
     """
 
     def __init__(self, label: str, everything: bool = False, most: int = MAX_LINES):
@@ -49,31 +49,31 @@ class Log:
 
     @property
     def full(self) -> bool:
-        """No more is shown."""
+        """Whether no more lines are shown."""
         return self._shown > self._most
 
     def tell(self, line: str) -> None:
-        """Say something of the FMU ourselves."""
+        """Print a line of our own about the FMU."""
         if line != self._last:
             self._last = line
             print(f"sensors: {self.label} {line}", file=sys.stderr, flush=True)
 
     def heard(self, said: str) -> None:
-        """Show a line of its own."""
+        """Show a line that comes from the FMU."""
         with self._lock:
             if self.full or said == self._last:
                 return
             self._shown += 1
             more = "" if self._most >= MAX_LINES_ON_REQUEST else " (--fmu-log shows more)"
-            self.tell(f"says more, which is not shown{more}" if self.full else said)
+            self.tell(f"has more output, which is not shown{more}" if self.full else said)
 
 
 class Listener:
-    """Reads what one process of an FMU says, so that it never waits for a reader.
+    """Reads the output of one process of an FMU, so that the process never waits for a reader.
 
     Attributes
     ----------
-    last : what it said last; "" for nothing.
+    last : the last line of its output; "" for none.
     """
 
     def __init__(self, stream: IO[bytes], log: Log):
@@ -82,7 +82,7 @@ class Listener:
         self._thread.start()
 
     def finish(self) -> None:
-        """Hear the last words of a process that has ended."""
+        """Read the rest of the output of a process that has ended."""
         self._thread.join(1.0)
 
     def _listen(self) -> None:
@@ -102,5 +102,5 @@ class Listener:
             kind, line = STATUS[min(line[1] - ord("0"), len(STATUS) - 1)], line[2:]
         if text := one_line(line):
             self.last = text
-            with suppress(OSError, ValueError):  # nobody reads what is shown: the FMU goes on all the same
+            with suppress(OSError, ValueError):  # our standard error may be closed; the FMU goes on
                 self._log.heard(f"logs {kind}: {text}" if kind else f"prints: {text}")

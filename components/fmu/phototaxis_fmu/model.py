@@ -1,4 +1,4 @@
-"""An FMU as a sensor model: stepped once a tick, begun anew with each episode, restarted when it fails."""
+"""Makes an FMU a sensor model: steps it at each tick, resets it at each episode, and restarts it when it fails."""
 
 import math
 import sys
@@ -17,36 +17,38 @@ from phototaxis_fmu.start import bounds
 from phototaxis_fmu.wiring import Wire, Wiring, size
 
 MAX_RESTARTS, RESTART_WINDOW_S = 3, 60.0
-"""An FMU that fails more than so many times within so many seconds keeps failing."""
+"""We give up on an FMU that fails more than MAX_RESTARTS times within RESTART_WINDOW_S seconds."""
 ROUNDING = 1e-6
-"""What an output may be beyond its limits, relative to them: enough for sums in single precision."""
+"""How far an output may exceed its limits, relative to them; enough for rounding in single precision."""
 MAX_FLOAT = sys.float_info.max
 MAX_REMEMBERED_TICKS = 100_000
-"""Ticks of an episode that are kept to bring a restarted FMU to the present."""
+"""Ticks of an episode whose inputs are kept, to repeat them with a restarted FMU."""
 
 
 class Step(NamedTuple):
-    """What the FMU was given at one tick."""
+    """The inputs of the FMU at one tick."""
 
     periods: int
-    """Periods since the tick before; more than 1 where ticks were missed."""
+    """Control periods since the previous tick; more than 1 if ticks were missed."""
     inputs: list[float]
 
 
 class Stepped:
-    """Instances of an FMU that go through an episode together, whatever happens to their process.
+    """Steps instances of an FMU through an episode, and restarts their process when it fails.
+
+    A restarted FMU gets all inputs of the episode again, so that its state is the same as before the failure.
 
     Parameters
     ----------
-    host : runs them.
-    wiring : how one of them is connected.
-    in_time : seconds that a tick may take before it is called slow.
-    label : names it in messages, as in "light FMU lag.fmu".
-    fallback : give it up when it keeps failing; otherwise that is an error.
+    host : the process or processes of the instances.
+    wiring : the connections of one instance.
+    in_time : seconds for a tick above which the FMU counts as slow.
+    label : names the FMU in messages, as in "light FMU lag.fmu".
+    fallback : whether to give the FMU up when it keeps failing; if not, that is an error.
 
     Attributes
     ----------
-    failed : it has been given up.
+    failed : whether the FMU has been given up.
     """
 
     def __init__(self, host: Host | Team, wiring: Wiring, in_time: float, label: str, fallback: bool):
@@ -59,15 +61,15 @@ class Stepped:
         self._limits = [_limits(wire) for wire in outputs]
         self._plain = all((wire.factor, wire.offset) == (1, 0) for wire in outputs)
         self.anew = -1
-        """Tick at which it had to forget the earlier part of an episode; −1: never."""
+        """Tick at which a restarted FMU lost the earlier part of its episode; −1: never."""
 
     def __call__(self, episode: int, tick: int, inputs: list[float]) -> Sequence[float] | None:
-        """Outputs of all instances, in our units; None when it has been given up.
+        """Return the outputs of all instances, in our units; None after the FMU was given up.
 
         Raises
         ------
         ComponentFailed
-            when it keeps failing and there is no fallback.
+            when the FMU keeps failing and there is no fallback.
         """
         if self.failed:
             return None
@@ -91,13 +93,13 @@ class Stepped:
         return [(value - wire.offset) / wire.factor for value, wire in zip(outputs, cycle(self._outputs), strict=False)]
 
     def _slow(self, seconds: float) -> None:
-        """Say once that it cannot keep up with real time."""
+        """Warn, only once, that the FMU cannot keep up with real time."""
         line = f"took {seconds:.2g} s for tick {self._tick}; in real time a tick lasts {self._in_time:g} s"
         print(f"sensors: {self.label}: {line}", file=sys.stderr, flush=True)
         self._in_time = math.inf
 
     def _again(self, why: Failed) -> Sequence[float] | None:
-        """Restart it and lead it through the episode again, or give it up."""
+        """Restart the FMU and repeat the episode with it, or give the FMU up."""
         while True:
             self._failures.append(time.monotonic())
             line = f"{self.label}: {why} at tick {self._tick}"
@@ -123,9 +125,9 @@ class Stepped:
                 why = error
 
     def _checked(self, outputs: Sequence[float]) -> Sequence[float]:
-        """The outputs; what is beyond its limits by rounding alone is put back to them."""
+        """Return the outputs, clipped to their limits if they exceed them only by rounding; else raise `Failed`."""
         for value, (low, high) in zip(outputs, cycle(self._limits), strict=False):
-            if not low <= value <= high:  # neither is NaN
+            if not low <= value <= high:  # true for NaN too
                 return self._clipped(outputs)
         return outputs
 
@@ -140,13 +142,13 @@ class Stepped:
 
 
 def _limits(wire: Wire) -> tuple[float, float]:
-    """What an output may be, in its own unit: as declared, and finite."""
+    """Return the limits of an output, in its own unit: the declared ones, and finite."""
     low, high = bounds(wire.variable)
     return max(low, -MAX_FLOAT), min(high, MAX_FLOAT)
 
 
 def _rounding(limit: float, wire: Wire) -> float:
-    """How far beyond a limit is rounding: relative to the limit, or to one of our units where it is 0."""
+    """Return how far an output may exceed a limit by rounding: relative to the limit, or to 1 in our unit if larger."""
     return ROUNDING * max(abs(limit), abs(wire.factor)) if abs(limit) < MAX_FLOAT else 0.0
 
 
@@ -159,13 +161,13 @@ def _words(low: float, high: float) -> str:
 
 
 class FmuModel:
-    """A sensor model that is an FMU.
+    """A sensor model whose readings come from an FMU.
 
     Parameters
     ----------
-    stepped : its instances.
-    rig : what the instances are given, and what becomes of their outputs.
-    builtin : takes its place when it has been given up.
+    stepped : the FMU's instances.
+    rig : computes the inputs of the instances, and the readings from their outputs.
+    builtin : the model that replaces the FMU after it was given up.
     """
 
     def __init__(self, stepped: Stepped, rig: Rig, builtin: SensorModel, name: str):
@@ -181,7 +183,7 @@ class FmuModel:
         return self._name if anew < 0 else f"{self._name}, its state begun anew at tick {anew}"
 
     def begun_anew(self, tick: int) -> None:
-        """Say that what was before this tick of the episode is not known to it."""
+        """Note that the FMU knows nothing of the episode before this tick."""
         self._stepped.anew = tick
 
     def __call__(self, moment: Moment) -> Sequence[float]:

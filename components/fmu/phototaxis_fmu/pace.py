@@ -1,4 +1,4 @@
-"""How often an FMU is stepped in a control period."""
+"""Plans the steps of an FMU in a control period."""
 
 import math
 from typing import NamedTuple
@@ -11,28 +11,33 @@ MAX_STEPS = 1000
 
 
 class StepPlan(NamedTuple):
-    """A control period as an FMU goes through it."""
+    """The steps of an FMU in a control period."""
 
     step: float
     """Length of one `doStep`, s."""
     times: int
     """Steps in a control period."""
     remark: str = ""
-    """What the FMU would rather have; "" where it gets it."""
+    """A line about the step size that the FMU's description asks for; "" if the FMU gets it."""
 
 
 def plan_steps(description: ModelDescription, period: float, asked: float) -> StepPlan:
-    """The steps for a control period, as asked (s; 0: as the FMU's description wants it).
+    """Plan the steps for a control period.
+
+    Parameters
+    ----------
+    period : the control period, s.
+    asked : the step size that the user asks for, s; 0: the one in the FMU's description, or the whole period.
 
     Raises
     ------
     UserError
-        when what is asked does not fit the period.
+        when the control period is not a whole number of the steps asked for.
     """
     if asked:
         times = _fits(asked, period)
         if not times:
-            raise UserError(f"--fmu-step {asked:g}: the control period, {period:g} s, is no whole number of such steps")
+            raise UserError(f"--fmu-step {asked:g}: the control period, {period:g} s, is not a whole number of steps")
         return StepPlan(asked, times)
     interface, experiment = description.coSimulation, description.defaultExperiment
     fixed = float(interface.fixedInternalStepSize or 0) if interface is not None else 0.0
@@ -47,12 +52,12 @@ def plan_steps(description: ModelDescription, period: float, asked: float) -> St
         return StepPlan(period, 1)
     words = "has" if own else "suggests"
     remark = f"{words} steps of {wish:g} s; it gets steps of {period:g} s, the control period"
-    hint = f" (--fmu-step {wish} gives it its own)" if 0 < fitting <= MAX_STEPS else ""
+    hint = f" (for its own: --fmu-step {wish})" if 0 < fitting <= MAX_STEPS else ""
     return StepPlan(period, 1, remark + hint)
 
 
 def _fits(step: float, period: float) -> int:
-    """How many such steps are the period; 0 when it is no whole number of them, or the step is no length."""
+    """Return the number of steps in a period; 0 if it is not a whole number, or the step is not a positive length."""
     ratio = period / step
     times = round(ratio) if 0 < ratio < math.inf else 0
     return times if abs(times * step - period) <= 1e-9 * period else 0

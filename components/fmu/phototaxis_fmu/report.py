@@ -1,4 +1,4 @@
-"""What is to be said of an FMU: its variables and connections, and how it does when it is driven about."""
+"""Reports on an FMU: its variables and connections, and how it behaves as a sensor of a moving robot."""
 
 import math
 import random
@@ -16,11 +16,11 @@ from phototaxis_fmu.start import bounds
 from phototaxis_fmu.wiring import SUITES, Suite, connect, declared_unit
 
 EPISODE_TICKS, EPISODE_COUNT = 50, 4
-"""Ticks and episodes of a dry run; each episode is gone through twice."""
+"""Ticks of an episode, and number of episodes, in a dry run; each episode is run twice."""
 
 
 def describe(fmu: Fmu) -> dict[str, Any]:
-    """An FMU as plain data."""
+    """Return everything about an FMU as plain data."""
     description = fmu.description
     variables = []
     for one in description.modelVariables:
@@ -55,7 +55,7 @@ def describe(fmu: Fmu) -> dict[str, Any]:
 
 
 def connection(fmu: Fmu, suite: Suite) -> dict[str, Any]:
-    """How an FMU would be connected as one kind of sensor, or why not."""
+    """Return how an FMU would be connected as one kind of sensor, or why it does not fit."""
     try:
         wiring = connect(fmu, suite, {}, {})
     except UserError as error:
@@ -65,12 +65,12 @@ def connection(fmu: Fmu, suite: Suite) -> dict[str, Any]:
 
 
 def text(found: dict[str, Any]) -> str:
-    """What `describe` has found, for a person."""
+    """Format the result of `describe` for a person."""
     here = "runs here" if found["runs_here"] else "does not run here as it is"
     has = ", ".join([*found["platforms"], *(["C sources"] if found["sources"] else [])]) or "nothing"
     needs = [
         *(["needs the tool that made it, or its language, at run time"] if found["needs_tool"] else []),
-        *(["one instance a process"] if found["once_per_process"] else []),
+        *(["only one instance per process"] if found["once_per_process"] else []),
     ]
     lines = [
         f"{found['file']}: {found['model']}, FMI {found['fmi']} co-simulation",
@@ -100,12 +100,12 @@ def text(found: dict[str, Any]) -> str:
 
 
 def dry_run(sensors: FmuSensors, kind: str) -> dict[str, Any]:
-    """Drive about at random, each episode twice.
+    """Move a robot with the FMU at random, each episode twice, and return a summary of the readings.
 
     Raises
     ------
     UserError
-        when the FMU fails, or the same inputs give other readings after a reset.
+        when the FMU fails, or the same inputs give different readings the second time.
     """
     arena = Arena("check", (10.0, 10.0), [Light((5.0, 5.0))])
     model: SensorModel = getattr(sensors(arena, Scene(arena)), kind)
@@ -120,7 +120,7 @@ def dry_run(sensors: FmuSensors, kind: str) -> dict[str, Any]:
             spent += time.perf_counter() - began
         if twice[0] != twice[1]:
             line = f"after {sensors.begins} the same inputs give other readings: runs with this FMU cannot be repeated"
-            raise UserError(line + (" (unless --fmu-fresh mends it)" if sensors.begins == "a reset" else ""))
+            raise UserError(line + (" (--fmu-fresh may help)" if sensors.begins == "a reset" else ""))
         readings += [value for one in twice[0] for value in one]
     ticks = 2 * EPISODE_TICKS * EPISODE_COUNT
     low, high = min(readings), max(readings)

@@ -1,4 +1,4 @@
-"""How many instances of an FMU stand for a robot's sensors, what they are given, and what becomes of their outputs."""
+"""Connects instances of an FMU to a robot's sensors: how many, with which inputs, and how outputs become readings."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -16,16 +16,16 @@ class Rig(Protocol):
     instances: int
 
     def feed(self, moment: Moment) -> list[float]:
-        """The inputs of all instances, in the FMU's units."""
+        """Return the inputs of all instances, in the FMU's units."""
         ...
 
     def collect(self, outputs: Sequence[float]) -> Sequence[float]:
-        """The readings from the outputs of all instances, which are in our units."""
+        """Return the readings; `outputs` are those of all instances, in our units."""
         ...
 
 
 class Lamps:
-    """A light model: one instance for each sensor and lamp; what they say is summed and clipped."""
+    """A light model: one instance for each sensor and lamp; a sensor's outputs are summed and clipped to 0..1."""
 
     ORDER = "distance", "bearing", "brightness", "visibility"
 
@@ -61,7 +61,7 @@ class Filters:
 
 
 class Beams:
-    """A sonar model: one instance for all beams, or one for each; no range is more than the sonar range."""
+    """A sonar model: one instance for all beams, or one for each; readings are clipped to the sonar range."""
 
     def __init__(self, wiring: Wiring, arena: Arena, builtin: SensorModel):
         self._builtin, self._farthest = builtin, arena.robot.sonar_range

@@ -1,4 +1,4 @@
-"""Puts FMUs in the place of the built-in sensor models, as the options say."""
+"""Replaces built-in sensor models by FMUs, as the options say."""
 
 import math
 from typing import NamedTuple
@@ -24,7 +24,7 @@ from phototaxis_fmu.rigs import Beams, Filters, Lamps, Rig
 from phototaxis_fmu.wiring import SUITES, Wiring, connect
 
 MAX_PROCESSES = 64
-"""Most processes for an FMU of which a process can have only one instance."""
+"""Most processes for an FMU that allows only one instance per process."""
 
 
 class Wired(NamedTuple):
@@ -35,14 +35,14 @@ class Wired(NamedTuple):
     fmu: Fmu
     wiring: Wiring
     archive: bytes | None
-    """The FMU with a library that was compiled for it; None where it brought one."""
+    """Content of the FMU with a library compiled here; None if its file has one for this machine."""
     log: Log
 
 
 class FmuSensors:
-    """Makes the models of a suite: FMUs where the options name one, else the built-in ones.
+    """Makes the sensor models of a robot: an FMU where the options name one, else the built-in model.
 
-    With `one_cpu` the thread that uses them stays on one CPU, with the FMUs; with `logging` their logging is on.
+    With `one_cpu`, the calling thread and the FMUs stay on one CPU; with `logging`, the FMUs' logging is on.
 
     Raises
     ------
@@ -67,18 +67,18 @@ class FmuSensors:
         self._running: list[Host | Team] = []
 
     def try_out(self) -> None:
-        """Load each FMU once, so that what is wrong is said before a run."""
+        """Load each FMU once, so that its errors show before a run."""
         for wired in self._wired.values():
             self._host(wired, 1, self._options.fmu_step or 1.0, quiet=True)
         self.close()
 
     @property
     def begins(self) -> str:
-        """What the episodes of the FMU begin with, as in "a reset"; an FMU that cannot be reset is found out in use."""
+        """How the FMU's episodes begin, as in "a reset"; it changes when the FMU turns out not to reset."""
         return self._running[0].begins
 
     def __call__(self, arena: Arena, scene: Scene) -> Models:
-        """The models for an arena; those made before are ended."""
+        """Make the models for an arena; this ends those made before."""
         self.close()
         if self._one_cpu:
             stay_on_one_cpu()
@@ -93,7 +93,7 @@ class FmuSensors:
         return Models(sonar, light)
 
     def batch(self, world: World, count: int) -> FmuBatch:
-        """The sensors of `count` robots in a world; models made before are ended."""
+        """Make the sensors of `count` robots in a world; this ends the models made before."""
         self.close()
         arena, crews = world.arena, dict[str, InstanceBatch]()
         for kind, wired in self._wired.items():
@@ -109,12 +109,12 @@ class FmuSensors:
             self._running.pop().stop()
 
     def _host(self, wired: Wired, instances: int, period: float, quiet: bool = False) -> Host | Team:
-        """Processes that have loaded the FMU; `quiet`: without a remark on its steps."""
+        """Start processes and load the FMU in them; with `quiet`, print no remark about its step size."""
         options = self._options
         if wired.fmu.once and instances > MAX_PROCESSES:
             raise UserError(
-                f"{wired.fmu.file}: a process can have it once, and {instances} instances are needed; "
-                f"at most {MAX_PROCESSES} processes are started (with evaluate: fewer --placements)"
+                f"{wired.fmu.file}: allows one instance per process, and {instances} instances are needed; "
+                f"at most {MAX_PROCESSES} processes are allowed (with evaluate, lower --placements)"
             )
         found = plan_steps(wired.fmu.description, period, options.fmu_step)
         if found.remark and not quiet:

@@ -1,4 +1,4 @@
-"""Start values of an FMU's variables, from the words of an option."""
+"""Parses the start values of an FMU's variables from options."""
 
 import math
 import re
@@ -21,7 +21,7 @@ TRUTH = {"true": True, "1": True, "false": False, "0": False}
 
 
 def start_value(fmu: Fmu, name: str, text: str) -> Parameter:
-    """What an option NAME=VALUE sets; a structural parameter changes the sizes of the arrays that depend on it.
+    """Parse the start value of a variable; a structural parameter also changes the sizes of arrays in `fmu`.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def start_value(fmu: Fmu, name: str, text: str) -> Parameter:
         wanted = math.prod(variable.shape)
         parts = parts * wanted if len(parts) == 1 else parts
         if len(parts) != wanted:
-            raise UserError(f"{said}: {name} has {wanted} values; give as many, or one for all")
+            raise UserError(f"{said}: {name} has {wanted} values; give {wanted}, or one for all")
     values = [_value(said, variable, part) for part in parts]
     structural = variable.causality == "structuralParameter"
     if structural:
@@ -50,7 +50,7 @@ def start_value(fmu: Fmu, name: str, text: str) -> Parameter:
 
 
 def bounds(variable: ModelVariable) -> tuple[float, float]:
-    """The declared minimum and maximum of a variable or of its declared type."""
+    """Return the declared minimum and maximum of a variable or of its type; infinite where there is none."""
     low = variable.min or (variable.declaredType.min if variable.declaredType else None)
     high = variable.max or (variable.declaredType.max if variable.declaredType else None)
     return -math.inf if low is None else float(low), math.inf if high is None else float(high)
@@ -66,13 +66,13 @@ def _value(said: str, variable: ModelVariable, text: str) -> int | float | bool 
             return text
         value: Any = _item(variable, text) if kind == "Enumeration" else int(text) if kind in WHOLE else float(text)
     except UnicodeError:
-        raise UserError(f"{said!a}: no UTF-8") from None
+        raise UserError(f"{said!a}: not valid UTF-8") from None
     except (ValueError, KeyError):
         needed = f", one of {', '.join(_items(variable))}" if kind == "Enumeration" else ""
         raise UserError(f"{said}: {variable.name} is of type {kind}{needed}") from None
     low, high = WHOLE.get(kind, (-SINGLE, SINGLE) if kind == "Float32" else (-math.inf, math.inf))
     if not low <= value <= high or math.isinf(value):
-        raise UserError(f"{said}: {variable.name} is of type {kind}, which does not have this value")
+        raise UserError(f"{said}: {variable.name} is of type {kind}, which cannot hold this value")
     low, high = bounds(variable)
     if kind != "Enumeration" and not low <= value <= high:
         raise UserError(f"{said}: out of its range {low:g} to {high:g}")
@@ -85,7 +85,7 @@ def _items(variable: ModelVariable) -> dict[str, int]:
 
 
 def _item(variable: ModelVariable, text: str) -> int:
-    """An item by its name or number."""
+    """Return the value of an enumeration item, given by its name or value."""
     items = _items(variable)
     if text in items:
         return items[text]

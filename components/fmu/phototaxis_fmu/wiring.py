@@ -1,4 +1,4 @@
-"""Which of our quantities is which variable of an FMU, and in which unit."""
+"""Connects our quantities to the variables of an FMU, and converts their units."""
 
 import math
 import re
@@ -18,7 +18,7 @@ BEAMS = 16
 
 
 class Port(NamedTuple):
-    """One of our quantities."""
+    """One of our quantities: an input that we give to an FMU, or an output that we take."""
 
     name: str
     unit: str
@@ -27,28 +27,28 @@ class Port(NamedTuple):
 
 
 class Suite(NamedTuple):
-    """What one kind of sensor gives to a model, and takes from it."""
+    """The inputs and the output of the models for one kind of sensor."""
 
     name: str
     inputs: tuple[Port, ...]
     output: Port
     raw: Port
-    """What a plain filter is given: a model with one input and one output of any names."""
+    """The input of a filter, which is a model with one input and one output of any name."""
     width: int
-    """How many sensors one instance may stand for, as an array or as numbered scalars."""
+    """Most sensors that one instance can compute, as an array or as numbered scalars."""
 
 
 RAW = Port("raw", "1", "the built-in model's reading, 0..1")
-RANGE = Port("range", "m", "from the rim to what the beam meets, at most the sonar range")
+RANGE = Port("range", "m", "distance from the robot's rim to what the beam meets, at most the sonar range")
 SUITES = {
     suite.name: suite
     for suite in (
         Suite(
             "light",
             (
-                Port("distance", "m", "from the sensor to the lamp"),
-                Port("bearing", "rad", "of the lamp, from straight ahead, to the left positive"),
-                Port("brightness", "1", "of the lamp"),
+                Port("distance", "m", "distance from the sensor to the lamp"),
+                Port("bearing", "rad", "direction of the lamp: 0 straight ahead, positive to the left"),
+                Port("brightness", "1", "brightness of the lamp"),
                 Port("visibility", "1", "1: in sight; 0: hidden"),
                 RAW,
             ),
@@ -62,7 +62,7 @@ SUITES = {
 
 
 class Wire(NamedTuple):
-    """One of our quantities at one variable: theirs = factor · ours + offset."""
+    """The connection of one of our quantities to a variable of the FMU: theirs = factor · ours + offset."""
 
     port: str
     variable: ModelVariable
@@ -71,7 +71,7 @@ class Wire(NamedTuple):
 
 
 class Wiring(NamedTuple):
-    """How one instance of an FMU is connected."""
+    """The connections and start values of one instance of an FMU."""
 
     inputs: list[Wire]
     outputs: list[Wire]
@@ -79,44 +79,44 @@ class Wiring(NamedTuple):
 
     @property
     def width(self) -> int:
-        """How many sensors one instance stands for."""
+        """Number of sensors that one instance computes."""
         return sum(map(size, self.outputs))
 
     @property
     def ports(self) -> list[str]:
-        """Our inputs that are connected, each once."""
+        """The names of our inputs that are connected, each once."""
         return list(dict.fromkeys(wire.port for wire in self.inputs))
 
 
 def connect(fmu: Fmu, suite: Suite, names: Mapping[str, str], parameters: Mapping[str, str]) -> Wiring:
     """Find the FMU's variables for our quantities.
 
-    `names` maps ours to theirs where they differ. An FMU with one real input and one real output needs no
+    `names` maps our names to the FMU's where they differ. An FMU with one real input and one real output needs no
     names. Numbered scalars are found too: range[0], range[1], … or range_0, range_1, … (from 0 or from 1).
 
     Raises
     ------
     UserError
-        for a variable that is missing, or of the wrong causality, type, size or unit.
+        when a variable is missing, or has the wrong causality, type, size or unit.
     """
     known = {port.name: port for port in (*suite.inputs, suite.output)}
     for ours in names:
         if ours not in known:
             raise UserError(f"--fmu-map {ours}=…: the {suite.name} model has no '{ours}', but {', '.join(known)}")
-    start = [start_value(fmu, *pair) for pair in parameters.items()]  # they may change the sizes of arrays
+    start = [start_value(fmu, *pair) for pair in parameters.items()]  # first, as they may change the sizes of arrays
     inputs = [wire for port in suite.inputs for wire in _find(fmu, suite, port, "input", names)]
     if not inputs:
         inputs = _only(fmu, suite.raw, "input", parameters)
     outputs = _find(fmu, suite, suite.output, "output", names) or _only(fmu, suite.output, "output")
     for wire in inputs:
         if wire.variable.name in parameters:
-            raise UserError(f"{fmu.file}: {wire.variable.name} is given our {wire.port}; it cannot have a value too")
+            raise UserError(f"{fmu.file}: {wire.variable.name} gets our {wire.port}, so --fmu-param cannot set it")
     wiring = Wiring(inputs, outputs, start)
     if suite.raw.name in wiring.ports and len(wiring.ports) > 1:
-        raise UserError(f"{fmu.file}: a filter of {suite.raw.name} cannot have {wiring.ports[0]} too")
+        raise UserError(f"{fmu.file}: a filter of {suite.raw.name} cannot have the input {wiring.ports[0]} too")
     if len({wiring.width, *(_count(wiring, port) for port in wiring.ports)}) > 1:
         counts = ", ".join(f"{port} {_count(wiring, port)}" for port in wiring.ports)
-        raise UserError(f"{fmu.file}: as many readings as inputs are needed; there are {wiring.width} for {counts}")
+        raise UserError(f"{fmu.file}: needs as many readings as inputs; it has {wiring.width} for {counts}")
     return wiring
 
 
@@ -125,7 +125,7 @@ def _count(wiring: Wiring, port: str) -> int:
 
 
 def size(wire: Wire) -> int:
-    """Number of values of a wire: more than 1 for an array."""
+    """Return the number of values of a wire: more than 1 for an array."""
     return _size(wire.variable)
 
 
@@ -134,7 +134,7 @@ def _size(variable: ModelVariable) -> int:
 
 
 def _find(fmu: Fmu, suite: Suite, port: Port, causality: str, names: Mapping[str, str]) -> list[Wire]:
-    """The variables of one of our quantities: one, or numbered ones; none when it has none and none was named."""
+    """Find the variables for one of our quantities: one or several numbered ones; none is an error only if named."""
     theirs = names.get(port.name, port.name)
     plain = fmu.variable(theirs)
     found = [plain] if plain else _numbered(fmu, theirs)
@@ -144,7 +144,7 @@ def _find(fmu: Fmu, suite: Suite, port: Port, causality: str, names: Mapping[str
         _fits(fmu, variable, causality)
     if found and sum(map(_size, found)) not in (1, suite.width):
         allowed = f"1 or {suite.width}" if suite.width > 1 else "1"
-        raise UserError(f"{fmu.file}: {theirs} has {sum(map(_size, found))} values; needed is {allowed}")
+        raise UserError(f"{fmu.file}: {theirs} has {sum(map(_size, found))} values; it must have {allowed}")
     return [_wire(fmu, port, variable) for variable in found]
 
 
@@ -160,7 +160,7 @@ def _numbered(fmu: Fmu, name: str) -> list[ModelVariable]:
 
 
 def _only(fmu: Fmu, port: Port, causality: str, given: Container[str] = ()) -> list[Wire]:
-    """The one real input or output that there is, apart from those that are given a value."""
+    """Find the only real input or output, apart from the variables in `given`, which have a start value."""
     real = [
         variable
         for variable in fmu.description.modelVariables
@@ -171,23 +171,26 @@ def _only(fmu: Fmu, port: Port, causality: str, given: Container[str] = ()) -> l
     ]
     if len(real) != 1:
         raise UserError(
-            f"{fmu.file}: none of its variables is called {port.name}, and which {causality} it is, is not clear; "
-            f"say --fmu-map {port.name}=NAME; its {causality}s are {fmu.listed(causality)}"
+            f"{fmu.file}: no variable is called {port.name}, and it is not clear which {causality} to use; "
+            f"add --fmu-map {port.name}=NAME; its {causality}s are {fmu.listed(causality)}"
         )
     return [_wire(fmu, port, real[0])]
 
 
 def _fits(fmu: Fmu, variable: ModelVariable, causality: str) -> None:
     if variable.causality != causality:
-        raise UserError(f"{fmu.file}: {variable.name} is of causality {variable.causality}; needed is {causality}")
+        raise UserError(f"{fmu.file}: {variable.name} has causality {variable.causality}; it must be {causality}")
     if variable.type not in REAL[fmu.version]:
         raise UserError(
-            f"{fmu.file}: {variable.name} is of type {variable.type}; needed is {' or '.join(REAL[fmu.version])}"
+            f"{fmu.file}: {variable.name} has type {variable.type}; it must be {' or '.join(REAL[fmu.version])}"
         )
 
 
 def _wire(fmu: Fmu, port: Port, variable: ModelVariable) -> Wire:
-    """theirs = (ours − offset) / factor, where the FMU declares SI = factor · theirs + offset."""
+    """Connect a quantity to a variable and convert the unit.
+
+    The FMU declares SI = factor · theirs + offset, so theirs = (ours − offset) / factor.
+    """
     unit = declared_unit(variable)
     if unit in (None, "", port.unit):
         return Wire(port.name, variable, 1.0, 0.0)
@@ -203,7 +206,7 @@ def _wire(fmu: Fmu, port: Port, variable: ModelVariable) -> Wire:
 
 
 def declared_unit(variable: ModelVariable) -> str | None:
-    """The unit of a variable or of its declared type."""
+    """Return the unit of a variable or of its declared type."""
     return variable.unit or (variable.declaredType.unit if variable.declaredType else None)
 
 

@@ -1,9 +1,9 @@
-"""The process that foreign code runs in: it loads one FMU and steps its instances for its parent.
+"""The process that runs an FMU's code: it loads one FMU and steps its instances for its parent.
 
-Requests come on standard input, answers go to what was standard output; what the FMU prints and logs goes to
-standard error. The first request is a `InstanceSetup` in JSON, after its length; each later one a head (`HEAD`: what to
-do, how many periods) and the inputs of all instances, as doubles. An answer is a head (`DONE` and 0) and the outputs;
-or `FAILED`, the length of a text, and the text; `REPLACED` with its text comes before an answer.
+Requests come on standard input, and answers go to the original standard output; what the FMU prints and logs goes to
+standard error. The first request is an `InstanceSetup` in JSON, after its length. Each later request is a head (`HEAD`:
+what to do, number of periods) and the inputs of all instances as doubles. An answer is a head (`DONE` and 0) and the
+outputs, or a head (`FAILED` and the length of a text) and the text. A head with `REPLACED` and its text may precede it.
 """
 
 import fcntl
@@ -20,12 +20,12 @@ HEAD = struct.Struct("<qq")
 LENGTH = struct.Struct("<q")
 BEGIN, STEP = 1, 2
 MIN_PIPE_NUMBER = 200
-"""Number from which on our pipes are: some FMUs close the first ones, which they think are their own."""
+"""Lowest file descriptor of our pipes: some FMUs close low ones, which they take for their own."""
 DONE, FAILED, REPLACED = 0, 1, 2
 
 
 class Worker:
-    """All instances, and the buffers that they share."""
+    """Holds all instances, and the buffers that they share."""
 
     def __init__(self, setup: InstanceSetup, voice: Voice):
         size_in, size_out = (8 * sum(end.values for end in ends) for ends in (setup.inputs, setup.outputs))
@@ -41,7 +41,7 @@ class Worker:
         ]  # fmt: skip
 
     def answer(self) -> str:
-        """Do what the head of the inputs says; why instances were replaced, if any was."""
+        """Do what the head of the inputs says; return why instances were replaced, or "" if none was."""
         order, count = HEAD.unpack_from(self.inputs)
         self._voice.forget()
         replaced = ""
@@ -54,7 +54,7 @@ class Worker:
 
 
 def read(source: int, into: memoryview) -> bool:
-    """Fill a buffer; False at the end of the stream."""
+    """Fill a buffer from a file descriptor; return False at the end of the stream."""
     while into:
         got = os.readv(source, [into])
         if not got:
@@ -64,7 +64,7 @@ def read(source: int, into: memoryview) -> bool:
 
 
 def serve(source: int, answers: int) -> None:
-    """Answer until the parent closes the stream."""
+    """Load the FMU, then answer requests until the parent closes the stream."""
     length = bytearray(LENGTH.size)
     if not read(source, memoryview(length)):
         return
@@ -81,7 +81,7 @@ def serve(source: int, answers: int) -> None:
             os.write(answers, worker.outputs)
         for one in worker.instances:
             one.end()
-    except Exception as error:  # of whatever kind: the parent tells it
+    except Exception as error:  # any error: the parent reports it
         with suppress(BrokenPipeError):
             _say(answers, FAILED, explain(error, voice))
 
@@ -93,7 +93,7 @@ def _say(answers: int, kind: int, words: str) -> None:
 
 def main() -> None:
     source, answers = (fcntl.fcntl(pipe, fcntl.F_DUPFD_CLOEXEC, MIN_PIPE_NUMBER) for pipe in (0, 1))
-    os.dup2(2, 1)  # what the FMU prints must not be taken for an answer
+    os.dup2(2, 1)  # so that the parent does not take what the FMU prints for an answer
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     serve(source, answers)
     sys.stdout.flush()

@@ -1,13 +1,13 @@
-"""The task as Gymnasium environments: one robot, or many in one process.
+"""Gymnasium environments of the task, for one robot or many.
 
-Importing this registers them. Gymnasium does so itself when the name says where from:
+Importing this package registers them. Gymnasium imports it by itself if the name includes the package:
 `gymnasium.make("phototaxis_gym:phototaxis/LightSeeker-v0")`.
 """
 
 import gymnasium
 
 MAX_EPISODE_STEPS = 300
-"""Steps after which an episode is truncated, unless `max_episode_steps` says otherwise."""
+"""Default of `max_episode_steps`, the number of steps after which an episode is truncated."""
 
 gymnasium.register(
     "phototaxis/LightSeeker-v0",

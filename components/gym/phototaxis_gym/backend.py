@@ -1,4 +1,4 @@
-"""Where an environment's robot is: in this process, or behind the bus; one interface for both."""
+"""The worlds behind the environments: one interface, with an implementation in this process and one on the bus."""
 
 from array import array
 from collections import deque
@@ -16,28 +16,29 @@ from phototaxis_sim.physics import Pose
 from phototaxis_sim.simulation import Simulation
 
 AUTHOR = "gymnasium"
+"""Name of the driver in a local world."""
 
 
 class Backend(Protocol):
-    """A world with one robot, tick by tick. The same seeds and commands give the same readings in all of them."""
+    """A world with one robot. The same seeds and commands give the same readings in every implementation."""
 
     @property
     def arena(self) -> Arena: ...
     @property
     def pose(self) -> Pose | None:
-        """x, y in m and the heading in rad; None where a robot's driver is not told."""
+        """The robot's pose (x, y in m, heading in rad); None on the bus, where a driver does not know it."""
         ...
 
     def begin(self, seed: int, start: Pose | None = None) -> Readings:
-        """A run with this seed, at its first tick; `start` takes the place of the seed's pose."""
+        """Begin a run with this seed, and return its first readings; `start` replaces the pose that the seed gives."""
         ...
 
     def drive(self, left: float, right: float) -> Readings:
-        """Hold the wheel commands, −1..1, for one control period."""
+        """Hold the wheel commands, −1..1, for one control period, and return the next readings."""
         ...
 
     def place(self, end: End, start: Pose | None = None) -> Readings:
-        """End the episode (`end` says why) and begin the run's next one."""
+        """End the episode for the reason `end`, and return the first readings of the next one."""
         ...
 
     def close(self) -> None:
@@ -45,30 +46,36 @@ class Backend(Protocol):
 
 
 class BatchBackend(Protocol):
-    """A world with N robots. Columns have N as their last axis."""
+    """A world with N robots. N is the last axis of observations."""
 
     @property
     def arena(self) -> Arena: ...
     @property
     def poses(self) -> np.ndarray | None:
-        """(N, 3); None where the driver is not told."""
+        """The poses (x, y in m, heading in rad), shape (N, 3); None on the bus, where a driver does not know them."""
         ...
 
     @property
     def tick(self) -> int:
-        """Of the newest readings."""
+        """The tick of the newest readings."""
         ...
 
     def begin(self, seeds: Sequence[int], starts: Mapping[int, Pose]) -> BatchObservation:
-        """A run in which robot i is placed as with `seeds[i]`, or at `starts[i]`."""
+        """Begin a run in which robot i has the placements of `seeds[i]`, or starts at `starts[i]`."""
         ...
 
     def drive(self, motors: np.ndarray, ends: np.ndarray) -> BatchObservation:
-        """Hold motors (2, N); robots with an end (index into `ENDS`, not 0) are placed anew instead."""
+        """Hold motors (2, N) for one control period.
+
+        A robot with an end (an index into `ENDS` that is not 0) does not drive, but begins a new episode.
+        """
         ...
 
     def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> BatchObservation:
-        """Place the robots with an end anew while the others wait: as with another seed, or at a pose."""
+        """Begin new episodes of the robots with an end while the others wait.
+
+        `seeds` gives some of them a new seed, and `starts` gives some of them a pose.
+        """
         ...
 
     def close(self) -> None:
@@ -78,8 +85,8 @@ class BatchBackend(Protocol):
 class LocalBatchBackend:
     """N robots in this process.
 
-    Can be copied and pickled: pymunk's own copies of a space go on a little differently, so a copy puts each robot
-    where its episode started and repeats its commands, as the simulation on the bus does with its journal.
+    It can be copied and pickled. A copied pymunk space does not continue exactly like the original, so a copy places
+    each robot where its episode began and repeats its commands, as the simulation on the bus does with its journal.
     """
 
     def __init__(self, arena: Arena):
@@ -116,7 +123,7 @@ class LocalBatchBackend:
         """Nothing is held."""
 
     def _placed(self, fresh: np.ndarray) -> BatchObservation:
-        """Note which episodes have begun; forget the commands of those that are over."""
+        """Note which episodes have begun, and drop commands that no running episode needs; return the observation."""
         self._ages[fresh] = 0
         self._starts[fresh] = self._simulation.poses[fresh]
         while len(self._journal) > self._ages.max():
@@ -155,7 +162,7 @@ class LocalBatchBackend:
 
 
 class LocalBackend:
-    """A world in this process; can be copied and pickled as `LocalBatchBackend` can."""
+    """A world in this process; it can be copied and pickled as `LocalBatchBackend` can."""
 
     def __init__(self, arena: Arena):
         self.arena = arena
@@ -185,7 +192,7 @@ class LocalBackend:
         return self._episode(start)
 
     def _episode(self, start: Pose | None) -> Readings:
-        """Note how an episode began, and the commands that follow."""
+        """Note how an episode begins, to repeat it in a copy; return its first readings."""
         self._start, self._commands = start, array("d")
         self._began = self._simulation.snapshot([], "")
         return self._suite(self._simulation.state)

@@ -1,4 +1,4 @@
-"""Pictures of the arena."""
+"""Draws the arena and its robot, as pictures or in a window."""
 
 import math
 from collections.abc import Sequence
@@ -9,17 +9,17 @@ from phototaxis.geometry.arena import Arena
 from PIL import Image, ImageDraw
 
 SIDE_PIXELS = 480
-"""Pixels of the longer side."""
+"""Length of a picture's longer side."""
 PAPER, INK, STONE, YELLOW, BLUE, RAY = "#f6f6f3", "#3c3c3c", "#787878", "#f0b400", "#145aaa", "#b4c8dc"
 
 
 def frame_rate(arena: Arena) -> float:
-    """Frames a second at which a film of one frame a step runs in real time."""
+    """Return the frames per second at which a film with one frame for each step runs in real time."""
     return 1 / arena.motion.control_period
 
 
 class Canvas:
-    """Draws robot and rays into a picture of what does not move, `side` pixels long."""
+    """Draws the robot and its sonar rays into a picture of the arena, whose longer side has `side` pixels."""
 
     def __init__(self, arena: Arena, side: int = SIDE_PIXELS):
         self._arena, self._scale = arena, side / max(arena.size)
@@ -38,7 +38,7 @@ class Canvas:
             draw.circle(self._at(*light.position), 0.14 * self._scale, YELLOW)
 
     def draw(self, pose: tuple[float, float, float], sonar: Sequence[float]) -> np.ndarray:
-        """(height, width, 3) uint8: the robot at a pose with its 16 rays of `sonar` metres."""
+        """Return a picture, (height, width, 3) uint8, of the robot at a pose (m, rad) with its 16 `sonar` rays (m)."""
         picture = self._still.copy()
         draw = ImageDraw.Draw(picture)
         robot = self._arena.robot
@@ -52,7 +52,7 @@ class Canvas:
         return np.array(picture)
 
     def _on(self, pose: tuple[float, float, float], point: tuple[float, float]) -> tuple[float, float]:
-        """A point of the robot's frame, in pixels."""
+        """Convert a point in the robot's frame to pixels."""
         x, y, heading = pose
         cos, sin = math.cos(heading), math.sin(heading)
         return self._at(x + cos * point[0] - sin * point[1], y + sin * point[0] + cos * point[1])
@@ -62,7 +62,7 @@ class Canvas:
 
 
 def tiles(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Pictures of one size as one picture, row by row, as square as can be."""
+    """Combine pictures of the same size into one, row by row, with about as many rows as columns."""
     columns = math.ceil(math.sqrt(len(pictures)))
     blank = np.zeros_like(pictures[0])
     padded = [*pictures, *[blank] * (-len(pictures) % columns)]
@@ -70,7 +70,7 @@ def tiles(pictures: Sequence[np.ndarray]) -> np.ndarray:
 
 
 class Window:
-    """A window on the screen; opens with its first picture, and again with the first one after `close`."""
+    """A window on the screen; it opens with its first picture, and again with the first one after `close`."""
 
     def __init__(self, fps: float):
         import pygame
@@ -79,7 +79,7 @@ class Window:
         self._surface = None
 
     def show(self, picture: np.ndarray) -> None:
-        """Show a picture, at the pace of a film."""
+        """Show a picture, and wait as long as one frame lasts."""
         pygame = self._pygame
         if self._surface is None:
             pygame.display.init()
@@ -96,5 +96,5 @@ class Window:
             self._pygame.display.quit()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy has a window of its own."""
+        """Give a copy a window of its own."""
         return Window, (self._fps,)

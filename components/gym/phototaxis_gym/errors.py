@@ -1,10 +1,10 @@
-"""Errors with the names that Gymnasium gives them, which are also of the types that its own environments raise."""
+"""Errors of two types: Gymnasium's own class for the case, and the type that its own environments raise."""
 
 from gymnasium.error import Error, InvalidAction, ResetNeeded
 
 
 class WrongAction(InvalidAction, AssertionError):
-    """An action lies outside the action space; CartPole asserts that it does not."""
+    """An action lies outside the action space; CartPole raises AssertionError for it."""
 
 
 class WrongCount(InvalidAction, ValueError):
@@ -16,8 +16,8 @@ class WrongSeeds(Error, ValueError):
 
 
 class WrongSteps(Error, ValueError):
-    """An episode would have no steps; `gymnasium.make` raises ValueError for it."""
+    """`max_episode_steps` is below 1; `gymnasium.make` raises ValueError for it."""
 
 
 class EpisodeOver(ResetNeeded, AssertionError):
-    """A robot whose episode has ended was stepped with `AutoresetMode.DISABLED`; SyncVectorEnv asserts the same."""
+    """A robot was stepped after its episode, with `AutoresetMode.DISABLED`; SyncVectorEnv raises AssertionError."""

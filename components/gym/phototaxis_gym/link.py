@@ -1,4 +1,4 @@
-"""A world behind the bus: the environment sits down on the driver's seat, as an agent does."""
+"""Connects an environment to a running system: it takes the driver's seat, as an agent does."""
 
 import time
 import weakref
@@ -18,15 +18,15 @@ from phototaxis.wire.messages import BatchCommand, Command, Control, ControlRepl
 from phototaxis.wire.topics import step_topics
 
 CONFIG_SUFFIXES = (".json5", ".json", ".yaml", ".yml")
-"""How the names of Zenoh's configuration files end."""
+"""File name endings by which `connect` is a Zenoh configuration file."""
 
 
 class Link:
-    """The driver's seat of a running system: simulation and sensors, and whoever records and watches.
+    """Holds the driver's seat of a running system, and drives its robots.
 
     Parameters
     ----------
-    connect : "local" for the sockets of this machine, a Zenoh endpoint as tcp/HOST:7447, or a Zenoh
+    connect : "local" for the sockets of this machine, a Zenoh endpoint such as tcp/HOST:7447, or a Zenoh
         configuration file (.json5, .json, .yaml) for a guarded router.
     world : name of the world on the bus.
     timeout : seconds to wait for an answer.
@@ -34,7 +34,7 @@ class Link:
     Raises
     ------
     gymnasium.error.Error
-        here and in every call: when nobody answers in time, or somebody else has taken the seat.
+        here and in every method: when no answer comes in time, or somebody else has taken the seat.
     """
 
     def __init__(self, connect: str, world: str, timeout: float):
@@ -75,29 +75,30 @@ class Link:
 
     @property
     def tick(self) -> int:
-        """Of the newest readings."""
+        """The tick of the newest readings."""
         return self._now.tick
 
     def begin(self, seed: int) -> Any:
-        """The first readings of a run with this seed; whoever drives is asked to hand over first."""
+        """Take over the seat, begin a run with this seed, and return its first readings."""
         self._check_open()
         self._sit()
         reply = self._bus.control(Control(verb="begin", agent=self.ident, seed=seed), timeout=self._timeout)
         if reply is None or not reply.ok:
-            raise Error(f"{self._where} does not begin anew: {reply.reason if reply else 'no answer'}")
+            raise Error(f"{self._where} does not begin a new run: {reply.reason if reply else 'no answer'}")
         self._now = None
         self._now = self._hear(lambda readings: readings.run == reply.status.run)
         return self._now
 
     def answer(self, make: Callable[[str, int], Command | BatchCommand]) -> Any:
-        """Answer the newest tick with what `make` makes of its run and number; the first readings that show it obeyed.
+        """Answer the newest tick, and return the first readings after the command was applied.
 
-        In lockstep those are the next tick's. In real time the world does not wait: what came while nobody was
-        listening is passed over, and an answer that came late is given again.
+        `make` makes the command from the name of the run and the number of the tick. In lockstep the next tick has
+        applied it. In real time the world does not wait: readings that came meanwhile are skipped, and a command that
+        came too late is sent again.
         """
         self._check_open()
         if self._now is None:
-            raise ResetNeeded("reset(seed=…) comes first")
+            raise ResetNeeded("call reset(seed=…) first")
         self._catch_up()
         before, topic = self._now, self._topics.command
         command = make(before.run, before.tick)
@@ -117,7 +118,7 @@ class Link:
     def __reduce__(self) -> Any:
         raise TypeError(
             f"an environment of {self._where} cannot be copied or pickled: it holds the driver's seat there, and there "
-            f"is one; make another, or one without connect"
+            f"is only one seat; make another environment, or one without connect"
         )
 
     def _check_open(self) -> None:
@@ -125,14 +126,14 @@ class Link:
             raise ClosedEnvironmentError("the environment is closed; make another one")
 
     def _catch_up(self) -> None:
-        """The newest readings that have come."""
+        """Move on to the newest readings that have come."""
         while (event := self._bus.receive(timeout=0)) is not None:
             self._notice(event)
             if event.topic == self._topics.readings and event.message.run == self._now.run:
                 self._now = event.message
 
     def _sit(self) -> None:
-        """Take the seat, if it is not ours. A finished run sends no readings that could show whose it is."""
+        """Take the seat if it is not ours. The reply counts too, since a finished run publishes no readings."""
         reply = self._carry(self._seat.want("take over", time.monotonic()), self._timeout)
         if reply is not None and reply.status.driver == self.ident:
             self._seat.seated()
@@ -140,7 +141,10 @@ class Link:
             self._hear(lambda _: self._seat.place is Place.DRIVING, seated=False)
 
     def _carry(self, effects: Sequence[Effect], timeout: float = 0.0) -> ControlReply | None:
-        """Put the seat's questions to the simulation, for `timeout` seconds (0: their own); the last answer."""
+        """Send the seat client's requests to the simulation, and return the last reply.
+
+        Each waits `timeout` seconds; 0: as long as the request says.
+        """
         reply = None
         for ask in effects:
             if isinstance(ask, Ask) and isinstance(ask.request, Control):
@@ -154,9 +158,9 @@ class Link:
         otherwise: Callable[[Any], object] = lambda _: None,
         seated: bool = True,
     ) -> Any:
-        """The first readings that are wanted; what else comes goes to `otherwise`.
+        """Wait for the first readings that `wanted` accepts, and return them; call `otherwise` with the others.
 
-        Once a run is under way, one that somebody else began in its place is an error.
+        With `seated`, readings of another driver or of a run that somebody else has begun are an error.
         """
         deadline = time.monotonic() + self._timeout
         while (left := deadline - time.monotonic()) > 0:
@@ -168,7 +172,7 @@ class Link:
             seeks = self._seat.see(readings, time.monotonic())
             if seated:
                 self._check_ours(readings)
-            self._carry(seeks)  # a simulation that is back: once seated we learn what it obeyed
+            self._carry(seeks)  # a restarted simulation has no driver: claim the seat, and wait until readings name us
             if seated and not readings.driver:
                 continue
             if wanted(readings):
@@ -177,7 +181,7 @@ class Link:
         raise Error(f"no readings within {self._timeout:g} s from {self._where}: {self._why()}")
 
     def _check_ours(self, readings: Any) -> None:
-        """Raise Error when somebody else drives, or has begun another run."""
+        """Raise Error when somebody else drives, or has begun a new run."""
         if readings.driver not in ("", self.ident):
             raise Error(f"{readings.driver} holds the seat now; reset(seed=…) takes it back")
         if self._now is not None and readings.run != self._now.run:
@@ -188,25 +192,25 @@ class Link:
             )
 
     def _why(self) -> str:
-        """Why no readings come, as far as the simulation can tell."""
+        """Say why no readings come, from what is on the bus and from the simulation's status."""
         if missing := [role for role in ("sim", "sensors") if role not in self._present]:
-            return f"{' and '.join(missing)} not there"
+            return f"{' and '.join(missing)} not on the bus"
         reply = self._bus.control(Control(verb="status"))
         if reply is None:
-            return "the simulation is there, but does not answer"
+            return "the simulation is on the bus, but does not answer"
         status = reply.status
         if status.phase == "paused":
-            return f"it is paused; phototaxis control resume --name {self._bus.name} lets it go on"
+            return f"it is paused; to continue: phototaxis control resume --name {self._bus.name}"
         if status.phase == "finished":
             own = status.driver in ("", self.ident)
             again = "reset(seed=…)" if own else f"phototaxis control begin --name {self._bus.name}"
             return f"its run is finished; {again} begins another"
         if status.driver not in ("", self.ident):
             return f"{status.driver} holds the seat and has not answered for {status.waited:.1f} s"
-        return f"it waits for {status.waiting_for}" if status.waiting_for else "though all are there"
+        return f"it waits for {status.waiting_for}" if status.waiting_for else "although all components are on the bus"
 
     def _notice(self, event: Event | None) -> None:
-        """Who is there; a simulation that is back knows nothing of us."""
+        """Note who is on the bus; a simulation that restarts may not know that we hold the seat."""
         if event is not None and event.topic in ("alive", "gone"):
             (self._present.add if event.topic == "alive" else self._present.discard)(event.message[0])
             if event.message[0] == "sim":
@@ -214,13 +218,13 @@ class Link:
 
 
 def _obeyed(command: Any, before: Any, now: Any) -> bool:
-    """Whether `now` comes after the command was applied: its echo, or new episodes where it ended some."""
+    """Whether the readings `now` come after the command was applied: they repeat its motors, or begin new episodes."""
     if now.tick <= before.tick:
         return False
     return now.episode != before.episode if any(command.end) else (now.left, now.right) == (command.left, command.right)
 
 
 def refuse_poses(starts: object) -> None:
-    """Raise ValueError where a pose is asked for."""
+    """Raise ValueError if the user gives a pose."""
     if starts:
         raise ValueError("options['pose']: a running system places its robots itself; leave it out with connect")

@@ -1,4 +1,4 @@
-"""A policy that Stable-Baselines3 has learned, in the driver's seat: frozen, and an agent like others."""
+"""Makes agents of frozen policies that Stable-Baselines3 has learned."""
 
 from pathlib import Path
 from typing import Any, Self
@@ -19,19 +19,19 @@ from phototaxis_gym.spaces import observer, rewards
 OBSERVATIONS = ("simple", "rich", "continuous", "sensors")
 
 Hidden = tuple[np.ndarray, ...] | None
-"""What a recurrent policy remembers of the episodes of the robots that it drives together; None for nothing yet."""
+"""The hidden state of a recurrent policy for all robots that it drives; None at first, and for other policies."""
 
 
 class FrozenPolicy:
-    """A frozen policy for N robots: from what they sense to their motor commands, as it was trained.
+    """Maps the observations of N robots to motor commands, with a policy that no longer learns.
 
-    Which percept and which actions it has follows from the model's spaces. It may drive any number of robots: what a
-    recurrent policy remembers of them is kept by its caller.
+    The model's spaces tell its percept and its actions. It can drive any number of robots, because the caller keeps
+    the hidden state of a recurrent policy.
 
     Raises
     ------
     UserError
-        when the spaces are none of ours.
+        when the model's spaces are not those of one of our environments.
     """
 
     def __init__(self, model: Any, file: Path, arena: Arena, normalize: Normalize | None = None):
@@ -45,7 +45,7 @@ class FrozenPolicy:
         self._observe, self._dtype = observer(self.percept, arena), space.dtype
 
     def motors(self, episode: Episode, hidden: Hidden) -> tuple[np.ndarray, Hidden]:
-        """The motor commands (N, 2) after the newest observation of N robots, and what is remembered from now on."""
+        """Return the motor commands (N, 2) after the newest observation of N robots, and the new hidden state."""
         starts = np.atleast_1d(episode.steps == 0)
         seen = np.asarray(self._observe(episode.now, episode.history), self._dtype)
         seen = seen.reshape(len(starts), *self._model.observation_space.shape)
@@ -55,28 +55,28 @@ class FrozenPolicy:
         return MOTORS[chosen] if self._discrete else np.asarray(chosen, float), hidden
 
     def stored(self, arrays: dict[str, np.ndarray], source: str) -> Hidden:
-        """What the arrays of a checkpoint remember of one robot's episode.
+        """Return the hidden state in the arrays of a checkpoint.
 
         Raises
         ------
         UserError
-            when it has another shape than this policy's; `source` names the checkpoint.
+            when its shape does not fit this policy; `source` names the checkpoint.
         """
         hidden = tuple(arrays[name] for name in sorted(arrays)) or None
         shape = getattr(self._model.policy, "lstm_hidden_state_shape", None)
         if hidden and any(part.shape != tuple(shape or ()) for part in hidden):
-            raise UserError(f"{source}: its memory does not fit the policy in {self.file}")
+            raise UserError(f"{source}: its hidden state does not fit the policy in {self.file}")
         return hidden
 
 
 def short(space: Any) -> str:
-    """A space in a few words: the bounds of a long vector are left out."""
+    """Describe a space briefly, without the bounds of a long vector."""
     words = str(space)
     return words if len(words) < 80 else f"{type(space).__name__} of the shape {space.shape}"
 
 
 def wrapped(space: Any, arena: Arena) -> str:
-    """Which wrapper may have made these observations from ours; empty when none is known."""
+    """Guess which wrapper changed our observations into these, as a remark for an error; "" if none is known."""
     shape = getattr(space, "shape", None) or ()
     for name in OBSERVATIONS:
         ours = observer(name, arena).space
@@ -103,7 +103,7 @@ class PolicyAgent(SeatedAgent):
         self.hidden: Hidden = None
 
     def decide(self, readings: Readings, over: bool) -> tuple[Step, tuple[float, float]]:
-        """Drive as the policy says."""
+        """Choose the motor commands with the policy."""
         reward = self._reward(self.episode)
         if over:
             return Step(0, -1, reward, 0.0, 0.0), (0.0, 0.0)
@@ -115,7 +115,7 @@ class PolicyAgent(SeatedAgent):
         return type(self)(self.policy, self.task.max_episode_steps)
 
     def checkpoint(self) -> tuple[CheckpointMetadata, dict[str, np.ndarray]]:
-        """Where it is in its episode, for a successor with the same policy; the policy itself is in its file."""
+        """Return the progress of the episode and the hidden state, for a successor that loads the same policy file."""
         arrays = {f"hidden_{at}": part for at, part in enumerate(self.hidden or ())}
         meta = self._meta(
             arrays, hyperparameters={}, exploration={}, budget=0, epoch=0, state=(), linked=False, random={}, visits=[]
@@ -123,26 +123,26 @@ class PolicyAgent(SeatedAgent):
         return meta, arrays
 
     def restore(self, meta: CheckpointMetadata, arrays: dict[str, np.ndarray], source: str) -> None:
-        """Continue where another one with the same policy is; UserError when its memory does not fit."""
+        """Continue from the checkpoint of an agent with the same policy; UserError when its arrays do not fit."""
         self.hidden = self.policy.stored(arrays, source)
         super().restore(meta, arrays, source)
 
 
 class BatchPolicyAgent:
-    """Drives N robots through an evaluation."""
+    """Drives N robots through an evaluation with a frozen policy."""
 
     def __init__(self, policy: FrozenPolicy):
         self._policy = policy
         self._hidden: Hidden = None
 
     def __call__(self, episode: Episode) -> np.ndarray:
-        """The motor commands (N, 2) of one tick."""
+        """Return the motor commands (N, 2) of one tick."""
         motors, self._hidden = self._policy.motors(episode, self._hidden)
         return motors
 
 
 class PolicyFile:
-    """Loads a policy at once, with the statistics of its observations, and makes agents of it.
+    """Loads a policy and the statistics of its observations once, and makes agents of it.
 
     Raises
     ------
@@ -165,7 +165,7 @@ class PolicyFile:
         return agent
 
     def batch(self, arena: Arena) -> BatchPolicyAgent:
-        """What drives many robots in an evaluation."""
+        """Make a driver of many robots for an evaluation."""
         return BatchPolicyAgent(self._policy(arena))
 
     def _policy(self, arena: Arena) -> FrozenPolicy:

@@ -1,4 +1,4 @@
-"""Files of Stable-Baselines3 and sb3-contrib: which algorithm saved one, the model in it, and its statistics."""
+"""Loads files of Stable-Baselines3 and sb3-contrib: the model, and the statistics of its observations."""
 
 import json
 import zipfile
@@ -13,13 +13,13 @@ import numpy as np
 from phototaxis.runtime.errors import UserError
 
 Normalize = Callable[[np.ndarray], np.ndarray]
-"""What VecNormalize makes of observations."""
+"""Normalises observations as VecNormalize did in the training."""
 
 SB3, CONTRIB = "stable_baselines3", "sb3_contrib"
 
 
 class Algorithm(NamedTuple):
-    """An algorithm and how its files are known: by a field that they have, or by a module of their policy's class."""
+    """An algorithm, and how to recognise its files: by a field in them, or by the module of their policy's class."""
 
     name: str
     package: str
@@ -27,7 +27,7 @@ class Algorithm(NamedTuple):
     module: str = ""
 
 
-ALGORITHMS = (  # the first that fits
+ALGORITHMS = (  # the first that fits counts, since some fields occur in files of several algorithms
     Algorithm("RecurrentPPO", CONTRIB, module="sb3_contrib.common.recurrent"),
     Algorithm("MaskablePPO", CONTRIB, module="sb3_contrib.common.maskable"),
     Algorithm("QRDQN", CONTRIB, field="n_quantiles"),
@@ -41,17 +41,16 @@ ALGORITHMS = (  # the first that fits
     Algorithm("PPO", SB3, field="clip_range"),
     Algorithm("A2C", SB3, field="gae_lambda"),
 )
-UNSUPPORTED = {"MaskablePPO": "which actions it may choose is decided by a mask that the file does not hold"}
+UNSUPPORTED = {"MaskablePPO": "they need an action mask, which the file does not hold"}
 
 
 def load(file: Path, trusted: bool) -> Any:
-    """The model in a file.
+    """Load the model in a file.
 
     Raises
     ------
     UserError
-        when the file is not trusted, not such a file, of an algorithm that is not supported, or what it needs is not
-        installed.
+        when the file is not trusted or not a policy file, its algorithm is not supported, or a package is missing.
     """
     try:
         with zipfile.ZipFile(file) as archive:
@@ -64,7 +63,7 @@ def load(file: Path, trusted: bool) -> Any:
     require_trust(file, trusted)
     for package in [SB3, CONTRIB] if bases[0].startswith(CONTRIB) else [SB3]:
         require(file, package)
-    if not bases[0].startswith((SB3, CONTRIB)):  # a class of the user's: what it derives from says what it is
+    if not bases[0].startswith((SB3, CONTRIB)):  # the user's own class: its base classes tell the algorithm
         bases = [kind.__module__ for kind in guarded(file, lambda: stored_class(file)).__mro__]
     algorithm = recognise(file, set(fields), bases)
     require(file, algorithm.package)
@@ -75,12 +74,12 @@ def load(file: Path, trusted: bool) -> Any:
 
 
 def normalizer(file: Path, trusted: bool, model: Any) -> Normalize:
-    """The statistics that `VecNormalize.save` has written; "none" in place of a file: observations stay as they are.
+    """Load the statistics that `VecNormalize.save` has written; the file name "none" leaves observations unchanged.
 
     Raises
     ------
     UserError
-        when the file is not trusted, not such a file, or of other observations than the model's.
+        when the file is not trusted, has no such statistics, or its observations have another shape than the model's.
     """
     if str(file) == "none":
         return lambda seen: seen
@@ -105,10 +104,10 @@ def normalizer(file: Path, trusted: bool, model: Any) -> Normalize:
 
 
 def was_normalized(model: Any) -> bool:
-    """Whether the training went through VecNormalize, as far as its last observations tell.
+    """Guess from the model's last observations whether it was trained through VecNormalize.
 
-    Those with a replay buffer keep the observation before the last one as the original where nothing is normalised.
-    So what tells of theirs is whether the environment can give the last one.
+    A model without a replay buffer keeps the last observation and the original one: they differ if it was normalised.
+    With a replay buffer the original may be older, so the test is whether the last one lies in the observation space.
     """
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
@@ -132,7 +131,7 @@ def require(file: Path, package: str) -> None:
 
 
 def stored_class(file: Path) -> Any:
-    """The class of the policy in a trusted file."""
+    """Return the class of the policy in a trusted file."""
     from stable_baselines3.common.save_util import load_from_zip_file
 
     data, _, _ = load_from_zip_file(file, device="cpu")
@@ -140,17 +139,17 @@ def stored_class(file: Path) -> Any:
 
 
 def recognise(file: Path, fields: set[str], bases: list[str]) -> Algorithm:
-    """The algorithm that has saved these fields, with a policy whose class and bases are of these modules."""
+    """Return the algorithm that saved these fields; `bases` are the modules of the policy's class and its bases."""
     for algorithm in ALGORITHMS:
         by_module = algorithm.module and any(base.startswith(algorithm.module) for base in bases)
         if by_module or algorithm.field in fields:
             return algorithm
     names = ", ".join(algorithm.name for algorithm in ALGORITHMS if algorithm.name not in UNSUPPORTED)
-    raise UserError(f"{file}: saved by an algorithm that is not known here; known are {names}")
+    raise UserError(f"{file}: saved by an unknown algorithm; the known ones are {names}")
 
 
 def guarded(file: Path, make: Callable[[], Any]) -> Any:
-    """What `make` reads from a trusted file, whatever a pickle does."""
+    """Return what `make` reads from a trusted file; UserError for any exception, since a pickle may raise any."""
     try:
         return make()
     except Exception as error:

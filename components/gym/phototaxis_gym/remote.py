@@ -1,4 +1,4 @@
-"""One robot behind the bus, as an environment drives it."""
+"""The backend of an environment that drives the robot of a running system."""
 
 from gymnasium.error import Error
 from phototaxis.wire.messages import Command, End, Readings
@@ -8,7 +8,7 @@ from phototaxis_gym.link import Link, refuse_poses
 
 
 class RemoteBackend:
-    """One robot behind the bus."""
+    """One robot on the bus."""
 
     pose = None
 
@@ -17,10 +17,10 @@ class RemoteBackend:
         self.arena = self._link.world.arena
         if self._link.world.robots > 1:
             self._link.close()
-            raise Error(f"the world '{world}' has {self._link.world.robots} robots: gymnasium.make_vec drives them")
+            raise Error(f"the world '{world}' has {self._link.world.robots} robots: use gymnasium.make_vec")
 
     def begin(self, seed: int, start: Pose | None = None) -> Readings:
-        """A new run with this seed."""
+        """Begin a new run with this seed, and return its first readings."""
         refuse_poses(start)
         return self._link.begin(seed)
 

@@ -1,4 +1,4 @@
-"""Many robots behind the bus, as a vector environment drives them."""
+"""The backend of a vector environment that drives the robots of a running system."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,11 +12,11 @@ from phototaxis_sim.physics import Pose
 
 from phototaxis_gym.link import Link, refuse_poses
 
-FOLLOW = "behind the bus the robots' seeds are S, S + 1, S + 2, …"
+FOLLOW = "on the bus the robots' seeds are S, S + 1, S + 2, …"
 
 
 class RemoteBatchBackend:
-    """N robots behind the bus."""
+    """N robots on the bus."""
 
     poses = None
 
@@ -25,7 +25,7 @@ class RemoteBatchBackend:
         self.arena = self._link.world.arena
         if self._link.world.robots != count or count == 1:
             self._link.close()
-            why = "one robot is for gymnasium.make" if count == 1 else f"start it with --robots {count}"
+            why = "for one robot, use gymnasium.make" if count == 1 else f"start it with --robots {count}"
             raise Error(f"the world '{world}' has {self._link.world.robots} robots, num_envs is {count}; {why}")
 
     @property
@@ -33,7 +33,7 @@ class RemoteBatchBackend:
         return self._link.tick
 
     def begin(self, seeds: Sequence[int], starts: Mapping[int, Pose]) -> BatchObservation:
-        """A new run; the seeds must follow one another."""
+        """Begin a new run; the seeds must be S, S + 1, S + 2, …."""
         refuse_poses(starts)
         if list(seeds) != list(range(seeds[0], seeds[0] + self._count)):
             raise Error(f"{FOLLOW}: give reset one number")
@@ -49,7 +49,7 @@ class RemoteBatchBackend:
         )
 
     def renew(self, ends: np.ndarray, seeds: Mapping[int, int], starts: Mapping[int, Pose]) -> BatchObservation:
-        """One tick, in which the others hold still."""
+        """Begin new episodes of some robots; this takes one tick, in which the others stand still."""
         refuse_poses(starts)
         if seeds:
             raise Error(f"{FOLLOW}: give reset one number, and no reset_mask")

@@ -1,4 +1,4 @@
-"""What `reset` is given: seeds, poses and masks, checked as Gymnasium's own environments check theirs."""
+"""Checks the arguments of `reset` as Gymnasium's own environments do: seeds, poses and masks."""
 
 import hashlib
 import math
@@ -13,15 +13,16 @@ from phototaxis_sim.physics import Physics, Pose
 from phototaxis_gym.errors import WrongSeeds
 
 MAX_SEED = 2**53
-"""The largest seed of a run: JSON carries it exactly."""
+"""The largest seed of a run; JSON readers with 64-bit floats still represent it exactly."""
 LOW_SEED_BITS = 20
+"""Low bits of a larger seed that `run_seed` keeps."""
 
 
 def run_seed(seed: int) -> int:
-    """The seed of the run that stands for a seed of Gymnasium's, which may be any number.
+    """Convert a seed of Gymnasium's, which may be any natural number, to the seed of a run.
 
-    Up to `MAX_SEED` it is the number itself. Of a larger one the upper bits are hashed and the lower 20 kept, so that
-    seeds which follow one another stay so.
+    A seed up to `MAX_SEED` stays as it is. For a larger one the upper bits are hashed and the lower 20 bits kept, so
+    that consecutive seeds stay consecutive.
     """
     if seed <= MAX_SEED:
         return int(seed)
@@ -31,14 +32,14 @@ def run_seed(seed: int) -> int:
 
 
 def row_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
-    """One seed for each of `count` robots: S, S + 1, S + 2, … of a number S; None where a run goes on.
+    """Return one seed for each of `count` robots: S, S + 1, S + 2, … for a number S; None lets a robot's run go on.
 
     Raises
     ------
     gymnasium.error.Error
-        for a seed that is negative or no Python integer.
+        when a seed is negative or not a Python integer.
     WrongSeeds
-        for a list of another length.
+        when a list has another length.
     """
     if seed is None:
         return [None] * count
@@ -47,39 +48,39 @@ def row_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int |
         raise WrongSeeds(f"{len(rows)} seeds: give one number, or one for each of the {count} robots")
     for one in rows:
         if one is not None and not (isinstance(one, int) and one >= 0):
-            seeding.np_random(one)  # raises what Gymnasium has for it
+            seeding.np_random(one)  # raises Gymnasium's own error
     return list(rows)
 
 
 def reset_mask(options: dict[str, Any] | None, count: int) -> np.ndarray:
-    """(count,) bool: which robots are reset; all of them unless the options have a "reset_mask".
+    """Return which robots to reset, bools of shape (count,): all unless the options have a "reset_mask".
 
     Raises
     ------
     TypeError, ValueError
-        as SyncVectorEnv does, for what is no array of so many bools with a True among them.
+        as SyncVectorEnv does, unless the mask is an array of `count` bools with at least one True.
     """
     if not options or "reset_mask" not in options:
         return np.ones(count, bool)
     mask = options["reset_mask"]
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
         what = f"an array of {mask.dtype}" if isinstance(mask, np.ndarray) else type(mask).__name__
-        raise TypeError(f"options['reset_mask'] is {what}: a NumPy array of bools is needed")
+        raise TypeError(f"options['reset_mask'] is {what}; it must be a NumPy array of bools")
     if mask.shape != (count,) or not mask.any():
         what = "names no robot" if mask.shape == (count,) else f"has the shape {mask.shape}"
         raise ValueError(
-            f"options['reset_mask'] {what}: one bool for each of {count} robots, at least one of them True"
+            f"options['reset_mask'] {what}; it must have one bool for each of {count} robots, at least one of them True"
         )
     return mask.copy()
 
 
 def given_poses(options: dict[str, Any] | None, arena: Arena, count: int = 1) -> dict[int, Pose]:
-    """The poses (x, y in m, heading in rad) that the options give, by robot: one for all, or one for each.
+    """Return the poses (x, y in m, heading in rad) in the options, by robot; the options have one for all or each.
 
     Raises
     ------
     ValueError
-        when they are no such numbers, or when the robot has no room at one.
+        when a pose is not three finite numbers, or the robot has no room there.
     """
     if not options or "pose" not in options:
         return {}

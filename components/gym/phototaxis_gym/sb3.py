@@ -1,4 +1,4 @@
-"""Many robots for Stable-Baselines3, which has a vector environment of its own kind."""
+"""Adapts the vector environment to Stable-Baselines3's own `VecEnv` interface."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,15 +12,15 @@ NAME = "phototaxis/LightSeeker-v0"
 
 
 class Robots(VecEnv):
-    """`gymnasium.make_vec` of `num_envs` robots as Stable-Baselines3's `VecEnv`, here or in a running system.
+    """`num_envs` robots as a `VecEnv` of Stable-Baselines3, in this process or in a running system.
 
-    Does what its `DummyVecEnv` does with a loop over single robots, but steps all of them together. `VecMonitor`
-    around it counts rewards and lengths of episodes.
+    It behaves like `DummyVecEnv` with as many single environments, but steps all robots together. Wrap it in
+    `VecMonitor` to get the rewards and lengths of episodes.
 
     Parameters
     ----------
     num_envs : number of robots.
-    options : those of `LightSeekers` but `autoreset_mode`.
+    options : the options of `LightSeekers`, except `autoreset_mode`.
     """
 
     def __init__(self, num_envs: int, **options: Any):
@@ -31,7 +31,7 @@ class Robots(VecEnv):
         self._actions: Any = None
 
     def reset(self) -> Any:
-        """The first observations; what `seed` and `set_options` were given is used once."""
+        """Return the first observations; seeds and options from `seed` and `set_options` are used once."""
         seeds = None if None in self._seeds else self._seeds
         poses = [one["pose"] for one in self._options if "pose" in one]
         seen, info = self.robots.reset(seed=seeds, options={"pose": poses} if poses else None)
@@ -44,7 +44,7 @@ class Robots(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> Any:
-        """Observations, rewards, ended episodes and infos, which have the last observation of an ended episode."""
+        """Return observations, rewards, dones and infos; the info of an ended episode has its last observation."""
         seen, reward, terminated, truncated, info = self.robots.step(self._actions)
         over, infos = terminated | truncated, rows(info, self.num_envs)
         for row, one in enumerate(infos):
@@ -74,6 +74,6 @@ class Robots(VecEnv):
 
 
 def rows(info: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """The `info` of a vector environment as one for each robot, without what ended episodes leave."""
+    """Split the `info` of a vector environment into one for each robot, without the entries of ended episodes."""
     keys = [key for key in info if not key.startswith(("_", "final_"))]
     return [{key: info[key][row] for key in keys} for row in range(count)]

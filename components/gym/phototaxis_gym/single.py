@@ -1,4 +1,4 @@
-"""One robot as a Gymnasium environment."""
+"""The Gymnasium environment with one robot."""
 
 from typing import Any, Literal
 
@@ -20,28 +20,27 @@ from phototaxis_gym.spaces import actions, motors, observer, rewards, valid_perc
 
 
 class LightSeeker(gymnasium.Env[Any, Any]):
-    """Find the light, in this process or behind the bus: the same seeds and actions give the same trajectory.
+    """An environment in which one robot learns to find the light, in this process or in a running system.
+
+    An episode is terminated when the robot reaches the light; then `info["is_success"]` is true. Only `gymnasium.make`
+    truncates it, after `max_episode_steps` (default 300). `reset(seed=…)` begins a new run, and the same seed and
+    actions give the same trajectory, here and on the bus; without a seed the next episode of the same run begins.
+    `reset(options={"pose": (x, y, heading)})` chooses the pose (m, rad), but not on the bus.
+
+    Copies and pickles continue exactly as the original does; an environment on the bus cannot be copied.
 
     Parameters
     ----------
-    percept : what is observed: "simple" (Discrete 24), "rich" (Discrete 400), "continuous" (Box of 12) or
+    percept : the observation: "simple" (Discrete 24), "rich" (Discrete 400), "continuous" (Box of 12) or
         "sensors" (Box of 20: 2 lights, 16 sonars in m, 2 bumpers).
-    arena : name of a shipped arena, or a TOML file; on the bus it is the simulation's.
+    arena : name of a shipped arena, or a TOML file; on the bus the simulation decides.
     reward : "own" (the percept's), "difference", "static" or "potential".
     action : "discrete" (nine motor commands) or "continuous" (two wheels, −1..1).
-    render_mode : None, "rgb_array" or "human"; on the bus None: people watch in the Rerun viewer.
-    connect : "" for a world in this process. "local" (this machine's sockets), a Zenoh endpoint as
-        "tcp/HOST:7447" or a Zenoh configuration file: drive the robot of a running system.
+    render_mode : None, "rgb_array" or "human"; on the bus only None, since people watch in the Rerun viewer.
+    connect : "" for a world in this process; or, to drive the robot of a running system, "local" (this machine's
+        sockets), a Zenoh endpoint such as "tcp/HOST:7447", or a Zenoh configuration file.
     world : name of the world on the bus.
     timeout : seconds to wait for an answer from the bus.
-
-    Terminated: the light is reached; then `info["is_success"]` is true. Truncated: never by itself; `gymnasium.make`
-    truncates after `max_episode_steps`, which is 300 unless it is given. `reset(seed=…)` begins anew: the same seed and
-    actions give the same trajectory; without a seed the next episode of the same run begins.
-    `reset(options={"pose": (x, y, heading)})` places the robot there (m, rad). On the bus a seed begins a new run, and
-    nobody can choose the pose.
-
-    Copies and pickles go on exactly as the original does; an environment on the bus has none.
     """
 
     metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 2}  # noqa: RUF012 - Gymnasium's own form
@@ -60,7 +59,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         modes = [] if connect else self.metadata["render_modes"]
         if connect and (arena or render_mode):
             what = f"arena '{arena}'" if arena else f"render_mode '{render_mode}'"
-            raise Error(f"{what}: that is the running system's; leave it out with connect")
+            raise Error(f"{what}: the running system decides that; leave it out with connect")
         if render_mode is not None and render_mode not in modes:
             raise Error(f"no render_mode '{render_mode}'; there are: {', '.join(modes)}")
         self._reward, self.action_space = rewards(reward, valid_percept(percept)), actions(action)
@@ -85,7 +84,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         """Begin an episode at a random placement, or at the pose in `options`."""
         start = given_poses(options, self._arena).get(0)
         super().reset(seed=seed)
-        if seed is None and self._np_random_seed == -1:  # the user has set the generator
+        if seed is None and self._np_random_seed == -1:  # the user has set `np_random`
             seed = int(self.np_random.integers(MAX_SEED))
         elif seed is None and self._episode.now is None:
             seed = self.np_random_seed
@@ -99,17 +98,17 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         """Hold an action for one control period (half a second in the paper's arena)."""
         episode = self._episode
         if episode.now is None:
-            raise ResetNeeded("reset() comes before step()")
+            raise ResetNeeded("call reset() before step()")
         wheels = motors(self.action_space, action)
         if episode.steps and episode.terminated:
-            logger.warn("step() after the episode has terminated: reset() begins the next one")
+            logger.warn("step() was called after the episode has terminated; call reset() to begin the next one")
         episode.step(self._backend.drive(*wheels))
         return self._look(), self._reward(episode), episode.terminated, False, self._info()
 
     def render(self) -> np.ndarray | None:
-        """A picture, (height, width, 3) uint8; None where it goes to a window."""
+        """Return a picture, (height, width, 3) uint8; or show it in a window and return None."""
         if self.render_mode is None:
-            logger.warn("render() without a render_mode shows nothing; give gymnasium.make one, as 'rgb_array'")
+            logger.warn("render() without a render_mode shows nothing; give gymnasium.make one, such as 'rgb_array'")
         pose = self._backend.pose
         if self._canvas is None or self._episode.now is None or pose is None:
             return None
@@ -126,7 +125,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
 
     @property
     def _end(self) -> End:
-        """How the present episode ends when the next one is asked for."""
+        """The reason with which the present episode ends when `reset` begins the next one."""
         return ENDS[self._episode.end] or "reset"
 
     def _look(self) -> Any:
@@ -135,7 +134,7 @@ class LightSeeker(gymnasium.Env[Any, Any]):
         return self._observe(self._episode.now, self._episode.history)
 
     def _info(self) -> dict[str, Any]:
-        """For people, not for learners: where the robot is (not on the bus, where a driver is not told)."""
+        """Return facts for people, not for learners; the pose only in this process, as a driver does not know it."""
         pose, readings = self._backend.pose, self._episode.now
         place = {} if pose is None else {"pose": np.array(pose)}
         success = self._episode.terminated

@@ -1,4 +1,4 @@
-"""What an environment's robot sees and does: the spaces, and how they come from readings, for one robot or many."""
+"""The spaces of an environment, and the conversions: sensors to observations, and actions to motor commands."""
 
 import math
 from typing import Any, Protocol
@@ -24,11 +24,11 @@ from phototaxis.task import (
 from phototaxis_gym.errors import WrongAction, WrongCount, WrongSteps
 
 ROUNDING = 1e-6
-"""How far a wheel command may lie outside of −1..1: what arithmetic in float32 makes of ±1. It is clipped."""
+"""How far a wheel command may lie outside −1..1 because of rounding in float32; it is clipped."""
 
 
 class Observer(Protocol):
-    """Makes an environment's observation, (N, …) for N robots, of what robots observe and of the steps before."""
+    """Computes an environment's observation, shape (N, …) for N robots, from the sensors and the light history."""
 
     @property
     def space(self) -> spaces.Space[Any]: ...
@@ -37,7 +37,7 @@ class Observer(Protocol):
 
 
 class States:
-    """The number of a percept's state: simple 0..23, rich 0..399, counted with the last variable fastest."""
+    """Observes the number of a percept's state: simple 0..23, rich 0..399; the last variable counts fastest."""
 
     def __init__(self, percept: Percept, near: float):
         self._percept, self._near = percept, near
@@ -48,7 +48,7 @@ class States:
 
 
 class Numbers:
-    """The variables of a percept of real numbers, float32."""
+    """Observes the variables of a continuous percept, float32."""
 
     def __init__(self, percept: Percept, near: float):
         self._percept, self._near = percept, near
@@ -59,7 +59,7 @@ class Numbers:
 
 
 class Sensors:
-    """Everything as it is sensed: 2 lights (0..1), 16 sonars (m), front and rear bumper (0 or 1), float32."""
+    """Observes all sensors: 2 lights (0..1), 16 sonars (m), front and rear bumper (0 or 1), float32."""
 
     def __init__(self, arena: Arena):
         high = [1.0] * 2 + [arena.robot.sonar_range] * 16 + [1.0] * 2
@@ -70,7 +70,7 @@ class Sensors:
 
 
 def _rows(variables: tuple[Any, ...]) -> np.ndarray:
-    """(variables,) of numbers, or (N, variables) of arrays."""
+    """Combine variables into one array: shape (variables,) if they are numbers, (N, variables) if they are arrays."""
     rows = np.empty((*max((np.shape(one) for one in variables), key=len), len(variables)), np.float32)
     for place, variable in enumerate(variables):
         rows[..., place] = variable
@@ -78,12 +78,12 @@ def _rows(variables: tuple[Any, ...]) -> np.ndarray:
 
 
 def valid_percept(percept: str) -> str:
-    """The name of an observation.
+    """Return the name of an observation unchanged.
 
     Raises
     ------
     gymnasium.error.Error
-        when there is none; it lists those that exist.
+        when there is no such observation; the text lists those that exist.
     """
     if percept not in PERCEPTS and percept != "sensors":
         raise Error(f"no percept '{percept}'; there are: {', '.join([*PERCEPTS, 'sensors'])}")
@@ -91,7 +91,7 @@ def valid_percept(percept: str) -> str:
 
 
 def observer(percept: str, arena: Arena) -> Observer:
-    """What makes the observation that `percept` names."""
+    """Return the observer of the observation that `percept` names."""
     if percept == "sensors":
         return Sensors(arena)
     found, near = PERCEPTS[percept], arena.sensing.near
@@ -99,12 +99,12 @@ def observer(percept: str, arena: Arena) -> Observer:
 
 
 def rewards(reward: str, percept: str) -> Reward:
-    """The reward scheme; "own" is the percept's, and `potential` for the bare sensors.
+    """Return a reward scheme; "own" is the percept's, or `potential` for "sensors".
 
     Raises
     ------
     gymnasium.error.Error
-        when there is none; it lists those that exist.
+        when there is no such scheme; the text lists those that exist.
     """
     name = OWN_REWARD.get(percept, "potential") if reward == "own" else reward
     if name not in REWARDS:
@@ -113,7 +113,7 @@ def rewards(reward: str, percept: str) -> Reward:
 
 
 def actions(kind: str) -> spaces.Space[Any]:
-    """Discrete: the nine of figure 5. Continuous: left and right wheel in −1..1.
+    """Return the action space: "discrete" for the nine actions of figure 5, "continuous" for two wheels in −1..1.
 
     Raises
     ------
@@ -128,12 +128,12 @@ def actions(kind: str) -> spaces.Space[Any]:
 
 
 def motors(space: spaces.Space[Any], action: Any) -> tuple[float, float]:
-    """The wheels' commands of one action, whatever number type it has.
+    """Convert one action, with numbers of any type, to the commands of the two wheels.
 
     Raises
     ------
     WrongAction
-        when it is not in the space.
+        when the action is not in the space.
     """
     if isinstance(space, spaces.Discrete):
         if space.contains(action):
@@ -145,16 +145,16 @@ def motors(space: spaces.Space[Any], action: Any) -> tuple[float, float]:
 
 
 def batch_motors(space: spaces.Space[Any], single: spaces.Space[Any], actions: Any, count: int) -> np.ndarray:
-    """(count, 2): the wheels' commands of a batch of actions in `space`, each of them in `single`.
+    """Convert a batch of actions to wheel commands, shape (count, 2); `single` is the space of one action.
 
     Raises
     ------
     WrongAction
-        when one is not in the space.
+        when an action is not in the space.
     WrongCount
-        when they are not so many.
+        when the number of actions is not `count`.
     TypeError
-        as SyncVectorEnv does, for what is no batch.
+        as SyncVectorEnv does, when `actions` is not a batch.
     """
     given: np.ndarray = actions if isinstance(actions, np.ndarray) else np.empty(0)
     if isinstance(single, spaces.Discrete):
@@ -169,7 +169,7 @@ def batch_motors(space: spaces.Space[Any], single: spaces.Space[Any], actions: A
 
 
 def _numbers(action: Any) -> np.ndarray:
-    """An action as an array of floats; empty when it is nothing of the kind."""
+    """Convert an action to an array of floats; the array is empty when that is impossible."""
     try:
         given = np.asarray(action)
     except ValueError:  # lists of different lengths
@@ -178,17 +178,17 @@ def _numbers(action: Any) -> np.ndarray:
 
 
 def valid_steps(max_episode_steps: int) -> int:
-    """The steps of an episode, at least one.
+    """Return the step cap unchanged.
 
     Raises
     ------
     TypeError
-        for what is no whole number.
+        when it is not a whole number.
     WrongSteps
-        for fewer than one.
+        when it is below 1.
     """
     if not isinstance(max_episode_steps, int | np.integer):
-        raise TypeError(f"max_episode_steps {max_episode_steps!r}: a whole number of steps is needed")
+        raise TypeError(f"max_episode_steps {max_episode_steps!r}: it must be a whole number")
     if max_episode_steps < 1:
         raise WrongSteps(f"max_episode_steps {max_episode_steps}: an episode has at least one step")
     return max_episode_steps

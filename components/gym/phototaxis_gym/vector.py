@@ -1,4 +1,4 @@
-"""Many robots as one vector environment, stepped together: in shared pymunk spaces and NumPy, or behind the bus."""
+"""The Gymnasium vector environment, which steps many robots together, in this process or on the bus."""
 
 from collections.abc import Sequence
 from typing import Any, Literal
@@ -26,19 +26,19 @@ from phototaxis_gym.spaces import actions, batch_motors, observer, rewards, vali
 class LightSeekers(VectorEnv[Any, Any, Any]):
     """The vector form of `LightSeeker`: the same options, spaces, rewards and ends for `num_envs` robots.
 
-    It does what Gymnasium's SyncVectorEnv does with as many `LightSeeker`s. Robot i begins with the placements of the
-    seed `seed + i`, episode after episode (or of the i-th of several seeds). Sensor noise is that of the first seed.
-    With `connect` the robots are those of a running system that was started with `--robots`.
+    It behaves like Gymnasium's SyncVectorEnv of as many `LightSeeker`s. In each episode robot i has the placement of
+    the seed `seed + i`, or of the i-th seed of a list. The sensor noise comes from the first seed. With `connect` it
+    drives the robots of a running system that was started with `--robots`.
 
     Parameters
     ----------
     max_episode_steps : steps after which an episode is truncated; −1 for no limit, None for 300.
     render_mode : None, "rgb_array" (`render` returns one picture for each robot) or "human" (all in one window).
-    autoreset_mode : what becomes of a robot whose episode has ended. NEXT_STEP: the next step places it anew and
-        ignores its action. SAME_STEP: it is placed anew at once; `info` has "final_obs" and "final_info". DISABLED:
-        `reset(options={"reset_mask": …})` places it anew. On the bus the last two take one more tick of the running
-        system, in which the other robots hold still.
-    disable_env_checker : has no effect, as there is no checker for many.
+    autoreset_mode : when a robot whose episode has ended begins a new one. NEXT_STEP: at the next step, which ignores
+        its action. SAME_STEP: at once; `info` has "final_obs" and "final_info". DISABLED: when the caller calls
+        `reset(options={"reset_mask": …})`. On the bus the last two take one more tick of the running system, in which
+        the other robots stand still.
+    disable_env_checker : has no effect, because Gymnasium has no checker for vector environments.
     """
 
     metadata = {  # noqa: RUF012 - Gymnasium's form
@@ -65,7 +65,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         modes = [] if connect else self.metadata["render_modes"]
         if connect and (arena or render_mode):
             what = f"arena '{arena}'" if arena else f"render_mode '{render_mode}'"
-            raise Error(f"{what}: that is the running system's; leave it out with connect")
+            raise Error(f"{what}: the running system decides that; leave it out with connect")
         if render_mode is not None and render_mode not in modes:
             raise Error(f"no render_mode '{render_mode}' for many robots; there are: {', '.join(modes)}")
         if num_envs < 1:
@@ -97,8 +97,8 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         self._episodes, self._ends = np.zeros(num_envs, int), np.zeros(num_envs, np.uint8)
 
     @property
-    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override] - as SyncVectorEnv has it
-        """The seed of each robot's run; drawn now if there is none yet."""
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override] - a tuple, as in SyncVectorEnv
+        """The seed of each robot; they are drawn now if there are none yet."""
         if self._seeds is None:
             first = seeding.np_random()[1]
             self._seeds = [first + row for row in range(self.num_envs)]
@@ -107,15 +107,16 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode of every robot, or of those in `options["reset_mask"]`; of its run where it has no seed.
+        """Begin an episode of every robot, or of those in `options["reset_mask"]`.
 
-        `options["pose"]` is a pose for all robots, (3,), or one for each, (N, 3): x and y in m, heading in rad.
+        A robot without a seed goes on with its run. `options["pose"]` is one pose for all robots, shape (3,), or one
+        for each, shape (N, 3): x and y in m, heading in rad.
         """
         count = self.num_envs
         mask, starts = reset_mask(options, count), given_poses(options, self._arena, count)
         rows, seeds = np.flatnonzero(mask).tolist(), row_seeds(seed, count)
         if self._episode.now is None and not mask.all():
-            raise ResetNeeded("the first reset() is of all robots; leave reset_mask out")
+            raise ResetNeeded("the first reset() must be of all robots; leave reset_mask out")
         known = self.np_random_seed
         used = [known[row] if one is None or not mask[row] else one for row, one in enumerate(seeds)]
         if mask.all() and (self._episode.now is None or None not in seeds):
@@ -132,12 +133,12 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold an action for one control period."""
         if self._episode.now is None:
-            raise ResetNeeded("reset() comes before step()")
+            raise ResetNeeded("call reset() before step()")
         motors = batch_motors(self.action_space, self.single_action_space, actions, self.num_envs)
         fresh = self._ends > 0
         if self._mode == AutoresetMode.DISABLED and fresh.any():
             over = np.flatnonzero(fresh).tolist()
-            raise EpisodeOver(f"the episodes of the robots {over} have ended: reset(options={{'reset_mask': …}}) first")
+            raise EpisodeOver(f"the episodes of the robots {over} have ended; call reset with a reset_mask first")
         self._episodes += fresh
         episode = self._episode
         episode.step(self._backend.drive(motors.T, self._ends))
@@ -157,11 +158,11 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         return seen, reward, terminated, truncated, {**info, **self._info(np.ones(self.num_envs, bool))}
 
     def render(self) -> tuple[Any, ...]:
-        """A picture of each robot, (height, width, 3) uint8; None where they go to a window."""
+        """Return a picture of each robot, (height, width, 3) uint8; or show them in a window and return Nones."""
         if self._episode.now is None:
-            raise ResetNeeded("reset() comes before render()")
+            raise ResetNeeded("call reset() before render()")
         if self._canvas is None:
-            logger.warn("render() without a render_mode shows nothing; give gymnasium.make_vec one, as 'rgb_array'")
+            logger.warn("render() without a render_mode shows nothing; give gymnasium.make_vec one: 'rgb_array'")
             return (None,) * self.num_envs
         poses, sonar = np.asarray(self._backend.poses).tolist(), self._episode.now.sonar.T.tolist()
         pictures = tuple(self._canvas.draw(pose, rays) for pose, rays in zip(poses, sonar, strict=True))
@@ -177,7 +178,7 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
             self._window.close()
 
     def _renew(self, mask: np.ndarray, seeds: dict[int, int], starts: dict[int, Any]) -> None:
-        """Begin new episodes of some robots; the others see what they have seen."""
+        """Begin new episodes of the robots in `mask`; the others keep their observations."""
         ends = np.where(mask, np.where(self._ends > 0, self._ends, RESET), 0).astype(np.uint8)
         pairs = zip(self._backend.renew(ends, seeds, starts), self._episode.now, strict=True)
         self._episode.begin(BatchObservation(*(np.where(mask, new, old) for new, old in pairs)), mask)
@@ -185,13 +186,13 @@ class LightSeekers(VectorEnv[Any, Any, Any]):
         self._episodes[list(seeds)] = 0
 
     def _look(self) -> Any:
-        """The observations."""
+        """Return the observations, after showing them in the window if there is one."""
         if self._window is not None:
             self.render()
         return np.asarray(self._observe(self._episode.now, self._episode.history), self.single_observation_space.dtype)
 
     def _info(self, mask: np.ndarray) -> dict[str, Any]:
-        """The `info` of those robots as SyncVectorEnv has it: an array for each key, with a mask."""
+        """Return the `info` of the robots in `mask` as SyncVectorEnv does: an array and a mask for each key."""
         poses, count = self._backend.poses, self.num_envs
         columns = {} if poses is None else {"pose": poses.copy()}
         columns["tick"] = np.full(count, self._backend.tick)

@@ -1,1 +1,1 @@
-"""The same classes in one process, without a bus: training, evaluation, experiments."""
+"""Trains, evaluates and compares agents in one process without a bus, with the same classes as on the bus."""

@@ -1,4 +1,4 @@
-"""One cell of an experiment: one agent learns with one seed, is frozen, and is measured."""
+"""Runs one cell of an experiment: an agent learns with one seed, is frozen, and is measured."""
 
 from typing import Any, NamedTuple
 
@@ -16,36 +16,37 @@ from phototaxis_lab.loop import Loop
 from phototaxis_lab.measure import evaluate
 
 PLACEMENTS = 200
+"""Fresh random placements on which each frozen policy is measured."""
 CURVE_POINTS = 100
 """Points of the curve of accumulated reward."""
 
 
 class System(Struct, frozen=True):
-    """An agent in an arena: what is learned and how."""
+    """The settings of an agent, and the arena in which it learns."""
 
     learner: str
     percept: str = "simple"
     reward: str = "preset"
-    """A reward scheme, or "preset": the one that the learner prefers."""
+    """A reward scheme, or "preset" for the learner's own choice."""
     arena: str = "paper"
     """Name of a shipped arena, or a TOML file."""
     options: tuple[tuple[str, Any], ...] = ()
-    """Options of the agent, (name, value), where they are not the learner's presets."""
+    """Options of the agent as (name, value); the others have the learner's presets."""
 
     def setup(self) -> AgentSetup:
-        """The agent's setup; UserError when an option does not fit."""
+        """Return the agent's setup; UserError when an option does not fit."""
         chosen = {} if self.reward == "preset" else {"reward": self.reward}
         return make_setup(self.learner, percept=self.percept, **chosen, **dict(self.options))
 
     @classmethod
     def of(cls, setup: AgentSetup, arena: str) -> "System":
-        """The system of a setup, every option spelt out."""
+        """Return the system of a setup, with the values of all options."""
         options = msgspec.to_builtins(setup.hyperparameters) | msgspec.to_builtins(setup.exploration)
         options["max_episode_steps"] = setup.task.max_episode_steps
         return cls(setup.learner, setup.task.percept, setup.task.reward, arena, tuple(options.items()))
 
     def check(self) -> None:
-        """UserError when there is no such arena, learner or option, or when they do not go together."""
+        """Raise UserError when there is no such arena, learner or option, or they do not fit each other."""
         self.setup().agent(World(run="check", arena=arenas.load_checked(self.arena), seed=0, epochs=1))
 
     def __str__(self) -> str:
@@ -55,7 +56,7 @@ class System(Struct, frozen=True):
 
 
 class Cell(Struct, frozen=True):
-    """A system, how long it learns, and with which seed."""
+    """A system, its number of learning steps, and its seed."""
 
     system: System
     epochs: int
@@ -63,14 +64,15 @@ class Cell(Struct, frozen=True):
 
 
 class Outcome(Struct):
-    """What became of a cell."""
+    """The measurements of a cell."""
 
     seed: int
     success_rate: float
-    """Share of 200 fresh placements from which the light was reached within 300 steps."""
+    """Share of 200 fresh placements from which the robot reached the light within 300 steps."""
     within_100: float
-    """The same within 100 steps."""
+    """The same share within 100 steps."""
     steps_mean: float | None
+    """As in `Evaluation`, and so is `path_ratio`."""
     path_ratio: float | None
     learner_hash: str
     episodes: int
@@ -78,24 +80,24 @@ class Outcome(Struct):
     rewards: list[float]
     """Accumulated reward at 100 equally spaced epochs."""
     visits: list[int]
-    """How often each state was met while learning; empty where states cannot be counted."""
+    """Number of learning steps in each state; empty if the percept is continuous."""
     reversals: float
-    """Share of the learning steps that undid the step before: forward after backward, or backward after forward."""
+    """Share of the learning steps that reverse the previous one: forward after backward, or backward after forward."""
 
 
 class Learned(NamedTuple):
-    """A cell after its learning."""
+    """A cell after learning."""
 
     agent: Agent
     loop: Loop
     rewards: np.ndarray
     """Reward of each epoch."""
     speeds: np.ndarray
-    """Sum of the motor commands of each epoch: whether it went forward or backward."""
+    """Sum of the two motor commands of each epoch; its sign says forward or backward."""
 
 
 def learn(cell: Cell) -> Learned:
-    """The agent of a cell, with what it went through."""
+    """Let the agent of a cell learn, and return it with its rewards and speeds."""
     arena = arenas.load(cell.system.arena)
     world = World(run="lab", arena=arena, seed=cell.seed, epochs=cell.epochs)
     agent = cell.system.setup().agent(world)
@@ -116,7 +118,7 @@ def learn(cell: Cell) -> Learned:
 
 @watchdog()
 def run(cell: Cell) -> Outcome:
-    """Learn, freeze, measure on 200 fresh placements; everything follows from the cell."""
+    """Learn, freeze, and measure on 200 fresh placements; the outcome depends only on the cell."""
     agent, loop, rewards, speeds = learn(cell)
     meta, _ = agent.checkpoint()
     agent.policy.learning = False

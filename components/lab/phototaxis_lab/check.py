@@ -1,4 +1,4 @@
-"""`phototaxis check`: a live agent against the contract; the generated files against the code."""
+"""`phototaxis check`: tests a live agent against the contract, and compares generated files with the code."""
 
 import sys
 from collections.abc import Sequence
@@ -18,15 +18,15 @@ from phototaxis.wire import document
 ROUTER = "deploy/zenoh/router.json5"
 WIRE = "docs/wire.md"
 CERTS = Path("/etc/phototaxis/certs")
-"""Where the shipped configuration looks for what `phototaxis certs` made."""
+"""The folder in which the shipped configuration expects the files of `phototaxis certs`."""
 
 
 class Options(BusOptions, kw_only=True):
     """Options of `phototaxis check`."""
 
     subject: Literal["agent", "rights", "wire"]
-    """agent: a live agent, of whatever make, answers a simulation as it must. rights: who may write and read what, and
-    whether a router's configuration says so. wire: whether the page about the wire format is up to date"""
+    """agent: test whether a live agent, in any language, follows the contract. rights: print which role may write and
+    read what, and compare a router's configuration. wire: test whether the page about the wire format is up to date"""
     file: str = ""
     """rights, wire: the file to compare (default: the one in the repository)"""
     worlds: WorldNames = "phototaxis"
@@ -34,11 +34,11 @@ class Options(BusOptions, kw_only=True):
     write: bool = False
     """rights, wire: write the file instead of comparing it"""
     ticks: Annotated[int, Meta(ge=10, le=100_000)] = 200
-    """agent: how many ticks to ask"""
+    """agent: number of ticks that it must answer"""
     answer_timeout: Annotated[float, Meta(gt=0, le=600)] = 1.0
-    """agent: seconds in which a tick must be answered"""
+    """agent: seconds within which it must answer a tick"""
     agent_timeout: Annotated[float, Meta(gt=0, le=600)] = 20.0
-    """agent: seconds to wait for one"""
+    """agent: seconds to wait for an agent"""
 
 
 def main(argv: Sequence[str]) -> int:
@@ -70,15 +70,15 @@ def _rights(options: Options) -> int:
     if differing:
         raise UserError(
             f"{file}: {' and '.join(differing)} differ from the tables of topics and roles (worlds: {options.worlds}); "
-            f"write it anew with --write"
+            f"write it again with --write"
         )
     _refuse_gaps(file, found)
-    print(f"{file} says the same", file=sys.stderr)
+    print(f"{file} agrees with this table", file=sys.stderr)
     return 0
 
 
 def _refuse_gaps(file: Path, found: zenoh.Config) -> None:
-    """UserError for what lets strangers in, or would where Zenoh's own `zenohd` reads the file."""
+    """Raise UserError for a setting that lets strangers in, here or when Zenoh's own `zenohd` reads the file."""
     exposure.refuse_exposures(found, str(file))
     for key in exposure.DISCOVERY:
         if exposure.get(found, key) is None:
@@ -90,7 +90,7 @@ def _wire(options: Options) -> int:
     if options.write:
         _put(file, document.page())
     elif not file.is_file() or file.read_bytes() != document.page().encode():
-        raise UserError(f"{file}: not up to date; write it anew with: phototaxis check wire --write")
+        raise UserError(f"{file}: not up to date; write it again with: phototaxis check wire --write")
     else:
         print(f"{file} is up to date", file=sys.stderr)
     return 0

@@ -1,4 +1,4 @@
-"""The contract of an agent, tried on a live one: this is the simulation and the sensors that it meets."""
+"""Tests a live agent against the contract, clause by clause; this program acts as its simulation and sensors."""
 
 import sys
 import time
@@ -17,26 +17,26 @@ from phototaxis_sim import arenas
 from phototaxis_sim.simulation import Simulation
 
 SILENCE_S = 0.5
-"""Seconds in which something that must not come does not come."""
+"""Seconds to wait for a message that must not come."""
 
 
 class Verdict(NamedTuple):
-    """What became of one clause of the contract."""
+    """The result for one clause of the contract."""
 
     clause: str
     fault: str
-    """"" when it is kept."""
+    """How the agent breaks the clause; "" when it keeps it."""
 
 
 def check(options: BusOptions, ticks: int, answer_timeout: float, agent_timeout: float) -> int:
-    """Try the first agent that comes to the world `options.name`; a line for each clause.
+    """Test the first agent that joins the world `options.name`, and print a line for each clause.
 
     Raises
     ------
     Unavailable
-        when a run is up in that world, or no agent comes in `agent_timeout` seconds.
+        when that world has a simulation already, or no agent joins within `agent_timeout` seconds.
     ComponentFailed
-        when a clause is broken.
+        when the agent breaks a clause.
     """
     _refuse_a_run(options)
     with (
@@ -60,17 +60,17 @@ def check(options: BusOptions, ticks: int, answer_timeout: float, agent_timeout:
 
 
 def _refuse_a_run(options: BusOptions) -> None:
-    """Raise Unavailable when there is a simulation already: the check is one itself, and two contradict each other."""
+    """Raise Unavailable when there is a simulation already, since this check acts as one and two would conflict."""
     with open_session("observer", options) as session, Bus(session, options.name, "observer", "check") as bus:
         if bus.wait_for("sim", SILENCE_S):
             raise Unavailable(
-                f"a run is up in the world '{options.name}', and this check plays the simulation itself; give it and "
+                f"a run is up in the world '{options.name}', and this check must be the only simulation; give it and "
                 "the agent a world of their own: --name trial"
             )
 
 
 class Trial:
-    """Leads one agent through the clauses."""
+    """Tests one agent on all clauses."""
 
     def __init__(self, sim: Bus, sensors: Bus, answer_timeout: float, agent_timeout: float):
         self._sim, self._sensors, self._answer_timeout, self._agent_timeout = (
@@ -85,10 +85,10 @@ class Trial:
         self._agent = ""
         self._asked: Readings | None = None
         self._answer = Command(run="", tick=0, author="", left=0.0, right=0.0)
-        """The last one that was as it should be."""
+        """The agent's last correct answer."""
 
     def run(self, ticks: int) -> Iterator[Verdict]:
-        """The clauses in order; those that follow from a broken one are left out."""
+        """Test the clauses in order; without a claim or a first answer, the others cannot be tested."""
         yield self._arrives()
         yield self._claims()
         if not self._agent:
@@ -112,7 +112,7 @@ class Trial:
         return Verdict("declares its liveliness token", "")
 
     def _claims(self) -> Verdict:
-        """The readings of a world without a driver, repeated, until a claim comes."""
+        """Publish readings that name no driver, again and again, until a claim comes."""
         self._ask("")
         self._await("control", self._agent_timeout)
         fault = "" if self._agent else f"no claim within {self._agent_timeout:g} s"
@@ -179,7 +179,7 @@ class Trial:
         self._sensors.put("readings", readings)
 
     def _fault(self, command: Command | None) -> str:
-        """What is wrong with an answer to what was asked last, if anything."""
+        """Say what is wrong with an answer to the newest readings; "" if nothing is."""
         tick = self._simulation.state.tick
         if command is None:
             refused = "; ".join(f"{why} × {count}" for why, count in self._sim.refused.items())
@@ -195,7 +195,10 @@ class Trial:
         return ""
 
     def _await(self, topic: str, timeout: float, repeat: bool = True) -> Command | None:
-        """The next command, or None after `timeout`; or, for "control", when the seat was claimed."""
+        """Wait for the next "command" and return it; or wait until the agent claims the seat ("control").
+
+        Returns None after `timeout` seconds. While it waits for a claim, it repeats the readings.
+        """
         deadline, again = time.monotonic() + timeout, time.monotonic() + 0.1
         while (left := deadline - time.monotonic()) > 0:
             event = self._sim.receive(timeout=min(left, 0.05))

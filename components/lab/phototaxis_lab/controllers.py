@@ -1,4 +1,4 @@
-"""Policies that learn nothing: the floor and the ceiling that learners are compared with."""
+"""Policies that do not learn: a lower and an upper level to compare learners with."""
 
 from collections.abc import Sequence
 
@@ -6,11 +6,11 @@ import numpy as np
 from phototaxis.task import FRONT, LEFT, MOTORS, RIGHT, Episode
 
 GAIN = 12.0
-"""How strongly the Braitenberg controller turns for a contrast between its two sensors."""
+"""Turn of the Braitenberg controller for each unit of contrast between its two light sensors."""
 
 
 class Random:
-    """Any of some actions, all equally likely."""
+    """Draws one of some actions at random, all equally likely."""
 
     def __init__(self, actions: Sequence[int], seed: int):
         self._motors = MOTORS[list(actions)]
@@ -21,10 +21,10 @@ class Random:
 
 
 class Braitenberg:
-    """Each light sensor drives the opposite wheel (Braitenberg's vehicle 2b), with an escape from obstacles.
+    """Drives each wheel by the light sensor of the opposite side (Braitenberg's vehicle 2b), and avoids obstacles.
 
-    It turns towards the brighter side the more the sides differ, spins where it is dark, and turns to the
-    freer side where something is nearer than `near` in front.
+    It turns towards the brighter side, faster when the sides differ more; it spins in the dark; and if something in
+    front is nearer than `near` (m), it turns to the side with more room.
     """
 
     def __init__(self, near: float):

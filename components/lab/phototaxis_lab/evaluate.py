@@ -1,4 +1,4 @@
-"""`phototaxis evaluate`: measure the policy in a checkpoint, or in a file of Stable-Baselines3."""
+"""`phototaxis evaluate`: measures the policy in a checkpoint, or in a file of Stable-Baselines3."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,17 +21,17 @@ class Options(Struct, kw_only=True):
     checkpoint: str
     """checkpoint (.npz) whose policy is measured, or a policy (.zip) that Stable-Baselines3 has saved"""
     placements: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
-    """fresh random placements"""
+    """number of fresh random placements"""
     seed: Seed = 1
-    """decides the placements and the policy's draws; never those of a training"""
+    """seed of the placements and of the policy's random choices; no seed repeats the placements of a training"""
     arena: str = ""
-    """another arena than the one of the training (which a .zip does not name: then paper)"""
+    """arena to measure in (default: that of the training; paper for a .zip, which does not name it)"""
     max_episode_steps: Annotated[int, Meta(ge=1)] = 300
     """steps after which a placement counts as failed"""
     trust: bool = False
-    """load a .zip although such a file can run any code: you trust who made it"""
+    """load a .zip; such a file can run any code, so use this only if you trust its author"""
     normalize: str = ""
-    """statistics of a .zip's observations: the file (.pkl) of VecNormalize.save, or none"""
+    """for a .zip that was trained through VecNormalize: the file (.pkl) that VecNormalize.save wrote, or none"""
     json: bool = False
     """print the result as one JSON object"""
 
@@ -80,7 +80,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def tell(found: Any, place: dict[str, str], as_json: bool) -> int:
-    """Print what was found, and in which arena."""
+    """Print the evaluation, and the arena that it was made in."""
     from phototaxis_lab.measure import describe
 
     told = msgspec.json.encode(msgspec.to_builtins(found) | place).decode()
@@ -89,12 +89,12 @@ def tell(found: Any, place: dict[str, str], as_json: bool) -> int:
 
 
 def where(path: Path, meta: Checkpoint, given: str) -> Arena:
-    """The arena to measure in: the one that is given, else that of the training, if it is a shipped one.
+    """Return the arena to measure in: the one that the user gives, else that of the training.
 
     Raises
     ------
     UserError
-        when the arena of the training is not shipped and no file is given.
+        when the user gives no arena, and that of the training is not a shipped one or has changed since.
     """
     from phototaxis_sim import arenas
 
@@ -103,6 +103,6 @@ def where(path: Path, meta: Checkpoint, given: str) -> Arena:
     arena = arenas.load_checked(given or meta.arena)
     if other := meta.elsewhere(arena):
         if not given:
-            raise UserError(f"{path}: {other}; give the file of the one, or the name of the other: --arena")
+            raise UserError(f"{path}: {other}; say which one to measure in: --arena with its name or file")
         warn(f"{path}: {other}")
     return arena

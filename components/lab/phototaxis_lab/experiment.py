@@ -1,4 +1,4 @@
-"""`phototaxis experiment`: a grid of agents and seeds, in parallel, that can be interrupted."""
+"""`phototaxis experiment`: computes a grid of agents and seeds in parallel, and can be interrupted and continued."""
 
 import json
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ LIST = Annotated[str, Meta(pattern=r"^[^, ]+(,[^, ]+)*$", description="a list wi
 
 
 class Options(Running, kw_only=True):
-    """Options of `phototaxis experiment`. Lists are separated by commas; all combinations are computed."""
+    """Options of `phototaxis experiment`; lists are separated by commas, and all combinations are computed."""
 
     learners: LIST = "qtable"
     """names of learners"""
     percepts: LIST = "simple"
     """percepts: simple, rich, continuous"""
     rewards: LIST = "preset"
-    """reward schemes: difference, static, potential; own, the paper's for the percept; preset, the learner's choice"""
+    """reward schemes: difference, static, potential; own: the paper's for the percept; preset: the learner's choice"""
     epochs: LIST = "3000"
     """numbers of learning steps"""
     seeds: SEEDS = "0:20"
@@ -31,9 +31,9 @@ class Options(Running, kw_only=True):
     arena: str = "paper"
     """name of a shipped arena, or a TOML file"""
     set: list[str] = field(default_factory=list)
-    """NAME=VALUE: an option of the agent, for all; may be repeated"""
+    """NAME=VALUE: an option for all agents (may be repeated)"""
     out: str = "runs/experiment"
-    """folder of the results; an interrupted experiment continues there"""
+    """folder of the results; the same command continues an interrupted experiment there"""
     json: bool = False
     """print the summary as one JSON object"""
 
@@ -52,7 +52,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def cells(options: Options) -> list[Any]:
-    """All combinations; each system is tried for what does not fit before anything is computed."""
+    """Return the cells of all combinations; UserError when a system cannot be built, before anything is computed."""
     from phototaxis_lab.cell import Cell, System
 
     given = tuple(_pair(text) for text in options.set)

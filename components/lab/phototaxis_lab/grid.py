@@ -1,4 +1,4 @@
-"""Computing many cells, and what they come to."""
+"""Computes many cells, and summarises their outcomes."""
 
 import sys
 from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ from phototaxis_lab.statistics import mean_interval, median_interval
 
 
 def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
-    """The outcomes of all cells; those that the folder holds already are not computed again."""
+    """Compute the outcomes of all cells, except those that the folder already holds."""
     with cluster(running.backend, running.scheduler), alone_in(folder):
         results = Results(folder, cells)
         missing = results.missing
@@ -28,9 +28,9 @@ def compute(cells: Sequence[Cell], folder: Path, running: Running) -> Results:
 
 
 def with_progress(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int, Outcome]]:
-    """`parallel.outcomes`, within a `cluster`, while the progress in epochs is shown."""
+    """Compute cells as `parallel.outcomes` does, and show the progress in epochs; call it within a `cluster`."""
     if cells:
-        print(f"agents that learn and are measured: {len(cells)}", file=sys.stderr, flush=True)
+        print(f"agents to train and measure: {len(cells)}", file=sys.stderr, flush=True)
     progress = Progress(sum(cell.epochs for cell in cells), "epochs")
     with progress:
         for index, outcome in outcomes(cells, running.jobs):
@@ -39,7 +39,7 @@ def with_progress(cells: Sequence[Cell], running: Running) -> Iterable[tuple[int
 
 
 def by_system(results: Results) -> dict[tuple[System, int], list[Outcome]]:
-    """The outcomes of each system and number of epochs, in the order of the grid."""
+    """Group the outcomes by system and number of epochs, in the order of the grid."""
     found: dict[tuple[System, int], list[Outcome]] = {}
     for index, cell in enumerate(results.cells):
         if index in results.done:
@@ -48,7 +48,7 @@ def by_system(results: Results) -> dict[tuple[System, int], list[Outcome]]:
 
 
 def summarise(results: Results) -> list[dict[str, Any]]:
-    """One plain summary for each system and number of epochs."""
+    """Return a summary as plain data for each system and number of epochs."""
     return [
         {"system": str(system), "epochs": epochs, **summary(of_seeds)}
         for (system, epochs), of_seeds in by_system(results).items()
@@ -56,7 +56,7 @@ def summarise(results: Results) -> list[dict[str, Any]]:
 
 
 def summary(of_seeds: Sequence[Outcome]) -> dict[str, Any]:
-    """Success over seeds: median, its 95% interval, worst, mean; path ratio and steps as medians."""
+    """Summarise outcomes over seeds: median and mean success with 95% intervals, worst success, median path ratio."""
     rates = [outcome.success_rate for outcome in of_seeds]
     ratios = [outcome.path_ratio for outcome in of_seeds if outcome.path_ratio is not None]
     return {
@@ -72,7 +72,7 @@ def summary(of_seeds: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def describe(summaries: Sequence[dict[str, Any]]) -> str:
-    """A table in plain text."""
+    """Format summaries as a table in plain text."""
     width = max(len(one["system"]) for one in summaries)
     lines = [f"{'':{width}}  {'epochs':>7}  success: median [95% interval]    worst   mean  path ratio"]
     for one in summaries:

@@ -1,4 +1,4 @@
-"""World, sensors and agent in one process: the step protocol without a bus."""
+"""Runs world, sensors and agent in one process, with the step protocol but without a bus."""
 
 import time
 
@@ -21,18 +21,18 @@ class Loop:
         self.agent = agent
 
     def step(self) -> EndedEpisode | None:
-        """One tick; the episode that it ended, if any."""
+        """Run one tick, and return the episode that it ended, if any."""
         command = self.agent(self.sensors(self.simulation.state))
         self.simulation.advance(command.left, command.right, command.author, command.end)
         return self.simulation.ended
 
     def finish(self) -> None:
-        """After the last epoch: the agent also learns from the state that it led to."""
+        """Let the agent learn from the state after the last epoch."""
         self.agent(self.sensors(self.simulation.state))
 
 
 def train(setup: AgentSetup, arena: Arena, seed: int, epochs: int, make: Make = built_in) -> tuple[Loop, float]:
-    """Learn for `epochs` steps; the loop as it ended, and the seconds it took."""
+    """Learn for `epochs` steps; return the loop in its final state, and the seconds that it took."""
     loop = Loop(arena, setup.agent(World(run="lab", arena=arena, seed=seed, epochs=epochs)), seed, epochs, make=make)
     began = time.perf_counter()
     with Progress(epochs, "epochs") as progress:

@@ -1,4 +1,4 @@
-"""How good is a frozen policy? Measured on fresh random placements."""
+"""Measures how well a frozen policy finds the light from fresh random placements."""
 
 import math
 from collections.abc import Callable
@@ -15,32 +15,33 @@ from phototaxis_sim.batch_physics import BatchPhysics
 from phototaxis_sim.physics import Physics, Pose
 
 SEED_OFFSET = 1_000_000_007
-"""Added to an evaluation's seed, so that its placements and noise are none of the training's."""
+"""Added to the seed of an evaluation, so that its placements and noise differ from those of a training."""
 
 MAX_EPISODE_STEPS = 300
 """Steps after which a placement counts as failed."""
 
 
 class Evaluation(Struct):
-    """What an evaluation found."""
+    """The result of an evaluation."""
 
     placements: int
     success_rate: float
-    """Share of placements from which the light was reached within `max_episode_steps`."""
+    """Share of placements from which the robot reached the light within `max_episode_steps`."""
     steps_mean: float | None
-    """Mean steps of the successful placements; None without any."""
+    """Mean number of steps of the successful placements; None if there are none."""
     path_ratio: float | None
-    """All steps of the successful placements over the steps of their direct ways (`direct_steps`)."""
+    """Sum of the steps of all successful placements, divided by the sum of their `direct_steps`; None if there are
+    none."""
     within_100: float
-    """Share of placements from which the light was reached within 100 steps."""
+    """Share of placements from which the robot reached the light within 100 steps."""
     max_episode_steps: int
     seed: int
 
 
 def direct_steps(arena: Arena, start: Pose) -> float:
-    """Steps to turn on the spot towards a light and drive straight to where it reads above 0.95.
+    """Return the steps to turn on the spot towards a light, and to drive straight until it reads above 0.95.
 
-    The light that takes the fewest; obstacles are ignored; at least 1.
+    Obstacles are ignored; of several lights the one with the fewest steps counts; the result is at least 1.
     """
     motion, robot, law = arena.motion, arena.robot, arena.sensing
     ahead = max(x for x, _ in robot.light_sensors)
@@ -69,9 +70,9 @@ def evaluate(
     sensors: SensorFactory = BUILT_IN,
     stepped: Callable[[], object] = lambda: None,
 ) -> Evaluation:
-    """Place `placements` robots at random, and let the frozen policy drive each of them for an episode.
+    """Place `placements` robots at random, and let the frozen policy drive each of them for one episode.
 
-    `stepped` is called when all have made one more step.
+    `stepped` is called after each step of all robots.
     """
     if policy.learning:
         raise ValueError("a policy that is evaluated must not learn")
@@ -80,7 +81,7 @@ def evaluate(
 
 
 Drive = Callable[[Episode], np.ndarray]
-"""From the episodes of N robots, after their newest observation, to motor commands (N, 2)."""
+"""Maps the episodes of N robots, after their newest observation, to motor commands, shape (N, 2)."""
 
 
 def measure(
@@ -92,7 +93,7 @@ def measure(
     sensors: SensorFactory = BUILT_IN,
     stepped: Callable[[], object] = lambda: None,
 ) -> Evaluation:
-    """Place `placements` robots at random, as `evaluate` does, and let `drive` drive them."""
+    """Place `placements` robots at random as `evaluate` does, and let `drive` choose their motor commands."""
     seed += SEED_OFFSET
     physics = Physics(arena)
     starts = [physics.random_pose(np.random.default_rng((seed, number))) for number in range(placements)]
@@ -125,7 +126,7 @@ def measure(
 
 
 def describe(found: Evaluation) -> str:
-    """An evaluation in words."""
+    """Describe an evaluation in words."""
     words = (
         f"{found.success_rate:.1%} of {found.placements} fresh placements reached the light "
         f"within {found.max_episode_steps} steps"

@@ -1,4 +1,4 @@
-"""Cells in parallel: over the cores of this machine, or over a Dask cluster."""
+"""Computes cells in parallel, on the cores of this machine or on a Dask cluster."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -15,9 +15,13 @@ SCHEDULER_TIMEOUT_S = 10.0
 
 
 def outcomes(cells: Sequence[Cell], jobs: int = -1) -> Iterator[tuple[int, Outcome]]:
-    """The outcome of each cell with its index, as they come. Longest first, so that no core is left alone at the end.
+    """Compute the cells; yield the index and the outcome of each as it is done.
 
-    `jobs` processes at a time, −1 for as many as there are cores; within `cluster`, what the cluster has.
+    The longest cells begin first, so that the cores stay busy until the end.
+
+    Parameters
+    ----------
+    jobs : number of processes, −1 for one on each core; within `cluster`, the cluster decides.
 
     Raises
     ------
@@ -30,7 +34,7 @@ def outcomes(cells: Sequence[Cell], jobs: int = -1) -> Iterator[tuple[int, Outco
         yield from work(joblib.delayed(_numbered)(index, cells[index]) for index in order)
     except TerminatedWorkerError:
         learners = ", ".join(sorted({cell.system.learner for cell in cells}))
-        line = "a process that learns ended without a word: its learner ended it, crashed, or took too much memory"
+        line = "a process died while learning: its learner ended it, crashed, or used too much memory"
         raise ComponentFailed(f"{line} (learners: {learners})") from None
 
 
@@ -39,7 +43,7 @@ def _numbered(index: int, cell: Cell) -> tuple[int, Outcome]:
 
 
 def cluster(backend: str, scheduler: str) -> AbstractContextManager[Any]:
-    """Where `outcomes` computes: "local", or "dask" with the address of a scheduler.
+    """Choose where `outcomes` computes: "local", or "dask" with the address of a scheduler.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""`phototaxis reproduce`: the paper's experiments, as a page of claims, measurements and figures."""
+"""`phototaxis reproduce`: repeats the paper's experiments, and writes a page of claims, measurements and figures."""
 
 import sys
 import time
@@ -17,13 +17,13 @@ class Options(Running, kw_only=True):
     seeds: SEEDS = "0:20"
     """A:B: the seeds from A to B − 1"""
     results: str = "runs/reproduction"
-    """folder of the results, paper/, beyond/ and fresh/; an interrupted reproduction continues there"""
+    """folder of the results; the same command continues an interrupted reproduction there"""
     out: str = "docs/reproduction"
-    """folder that the page and its figures are written to"""
+    """folder for the page and its figures"""
 
 
 def main(argv: Sequence[str]) -> int:
-    about = "Run the paper's experiments and those beyond it, and write the page that says what became of its claims."
+    about = "Run the paper's experiments and further ones, and write the page with a verdict on each of its claims."
     options = parse(Options, argv, "phototaxis reproduce", about)
     seeds, out = seed_range(options.seeds), Path(options.out)
     from phototaxis_lab.grid import by_system, compute

@@ -1,4 +1,4 @@
-"""A folder of results that a killed experiment continues."""
+"""Keeps the results of an experiment in a folder, so that a killed experiment can continue."""
 
 import fcntl
 import json
@@ -20,30 +20,28 @@ from phototaxis_lab.cell import Cell, Outcome, System
 
 
 class Row(Struct):
-    """A cell and what became of it: one line of `results.jsonl`."""
+    """A cell and its outcome: one line of `results.jsonl`."""
 
     cell: Cell
     outcome: Outcome
 
 
 class Results:
-    """`grid.json`, the systems with all that decides their outcomes, and `results.jsonl`, one line for each cell done.
+    """The outcomes of cells in a folder.
 
-    A folder may be asked for more seeds, epochs or systems than it holds: they are added. What it holds beside the
-    cells that are asked for stays there.
+    `grid.json` holds the systems, with everything that their outcomes depend on; `results.jsonl` holds a line for each
+    cell that is done. A folder can be extended with more seeds, epochs or systems; its other outcomes stay there.
+    Outcomes for which the disk has no room stay in memory, and are written as soon as it has.
 
     Parameters
     ----------
     folder : made if it does not exist.
-    cells : of the experiment.
+    cells : all cells of the experiment.
 
     Raises
     ------
     UserError
-        when a system of the same name meant something else when the folder was begun, or the folder cannot be
-        written.
-
-    Outcomes that find no room on the disk are kept in memory and are written as soon as there is some.
+        when the folder has a system of the same name with other options or another arena, or cannot be written.
     """
 
     def __init__(self, folder: Path, cells: Sequence[Cell]):
@@ -58,10 +56,10 @@ class Results:
             raise UserError(f"{folder}: {error.strerror}") from None
 
     def _extend(self, file: Path) -> None:
-        """Add the systems that the grid does not have; those that it has must still be what they were."""
+        """Add new systems to the grid; UserError when a known one has changed."""
         ours = _systems(self.cells)
         if self._path.exists() and not file.exists():
-            raise UserError(f"{file}: missing, so nobody knows what the results mean; give another folder")
+            raise UserError(f"{file}: missing, so it is unknown what the results mean; give another folder")
         try:
             known = json.loads(file.read_text("utf-8-sig"))["systems"] if file.exists() else {}
             changed = next((name for name in ours if known.get(name, ours[name]) != ours[name]), None)
@@ -69,14 +67,14 @@ class Results:
             raise UserError(f"{file}: damaged; remove it, or give another folder") from None
         if changed is not None:
             raise UserError(
-                f"{file.parent}: holds results of '{changed}' in another arena or with other options of the same name; "
+                f"{file.parent}: holds results of '{changed}' in another arena or with other options; "
                 "give another folder, or remove this one"
             )
         if ours.keys() - known.keys():
             write_atomic(file, json.dumps({"systems": known | ours}, indent=1).encode())
 
     def _read(self) -> dict[int, Outcome]:
-        """What is done, by the index of the cell; a line that a kill left unfinished is dropped."""
+        """Read the outcomes, by index of the cell; drop a last line that a kill left unfinished."""
         if not self._path.exists():
             return {}
         *whole, rest = self._path.read_bytes().removeprefix(BOM_UTF8).split(b"\n")
@@ -91,7 +89,7 @@ class Results:
         try:
             return msgspec.json.decode(line, type=Row)
         except msgspec.MsgspecError as error:
-            raise UserError(f"{self._path}, line {number}: {plain(str(error))}; mend it or remove it") from None
+            raise UserError(f"{self._path}, line {number}: {plain(str(error))}; repair or remove the line") from None
 
     @property
     def missing(self) -> list[int]:
@@ -99,7 +97,7 @@ class Results:
         return [index for index in range(len(self.cells)) if index not in self.done]
 
     def add(self, index: int, outcome: Outcome) -> None:
-        """Keep an outcome, at once if the disk has room."""
+        """Add an outcome, and write it at once if the disk has room."""
         self.done[index] = outcome
         self._waiting.append(msgspec.json.encode(Row(self.cells[index], outcome)) + b"\n")
         first = len(self._waiting) == 1
@@ -107,15 +105,15 @@ class Results:
             self.settle()
         except Unavailable as fault:
             if first:
-                warn(f"{fault}; the outcomes from now on are lost if you end this before there is room again")
+                warn(f"{fault}; the outcomes from now on are lost if you end this before the disk has room again")
 
     def settle(self) -> None:
-        """Write the outcomes that wait for room.
+        """Write the outcomes that wait for room on the disk.
 
         Raises
         ------
         Unavailable
-            when there is still none.
+            when there is still no room.
         """
         while self._waiting:
             try:
@@ -126,7 +124,7 @@ class Results:
 
 
 def _systems(cells: Sequence[Cell]) -> dict[str, Any]:
-    """Each system spelt out: its presets and its arena may have changed since a folder was begun."""
+    """Return each system with all option values and its arena, because these may change while the name stays."""
     systems = {
         str(system): {"as": System.of(system.setup(), system.arena), "arena": arenas.load(system.arena)}
         for system in dict.fromkeys(cell.system for cell in cells)
@@ -136,12 +134,12 @@ def _systems(cells: Sequence[Cell]) -> dict[str, Any]:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Keep a folder, which is made where it is missing, to ourselves.
+    """Lock a folder against other experiments; make it if it is missing.
 
     Raises
     ------
     Unavailable
-        when another process computes there.
+        when another process has locked it.
     UserError
         when the folder cannot be used.
     """

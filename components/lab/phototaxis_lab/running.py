@@ -1,4 +1,4 @@
-"""What all commands share that compute many cells: where, how many at a time, and which seeds."""
+"""The options that all commands share that compute many cells: where, how many at a time, and the seeds."""
 
 from typing import Annotated, Literal
 
@@ -11,14 +11,14 @@ SEEDS = Annotated[
 
 
 class Running(Struct, kw_only=True):
-    """Options of everything that computes many cells."""
+    """Options of the commands that compute many cells."""
 
     jobs: Annotated[int, Meta(ge=-1, le=10_000)] = -1
-    """processes at a time; -1: one for each core"""
+    """number of processes; -1: one for each core"""
     backend: Literal["local", "dask"] = "local"
     """where to compute: this machine, or a Dask cluster whose workers have phototaxis installed"""
     scheduler: str = ""
-    """address of the Dask scheduler, as in tcp://HOST:8786; trust it: Dask's messages can run code"""
+    """address of the Dask scheduler, as in tcp://HOST:8786; it must be trusted, as Dask's messages can run any code"""
 
     def __post_init__(self) -> None:
         if self.backend == "dask" and not self.scheduler:
@@ -28,7 +28,7 @@ class Running(Struct, kw_only=True):
 
 
 def seed_range(text: str) -> range:
-    """The seeds A to B − 1 of A:B; UserError when there are none."""
+    """Return the seeds A to B − 1 of "A:B"; UserError when there are none."""
     first, _, end = text.partition(":")
     seeds = range(int(first), int(end))
     if not seeds:

@@ -1,4 +1,4 @@
-"""What many seeds say: medians, means, and how sure one may be."""
+"""Confidence intervals of medians and means over seeds."""
 
 from collections.abc import Sequence
 from math import comb
@@ -18,10 +18,11 @@ class Interval(NamedTuple):
 
 
 def median_interval(values: Sequence[float]) -> Interval:
-    """Of the median, from order statistics: whatever the distribution, for outcomes of seeds are bimodal.
+    """Return the interval of the median from order statistics.
 
-    From the r-th lowest to the r-th highest value, r the largest rank that covers at least 95%; with fewer
-    than 6 values none does, and it is the lowest and the highest.
+    They hold for any distribution, and outcomes over seeds are bimodal. The interval goes from the r-th lowest to the
+    r-th highest value, with the largest rank r that covers at least 95%. With fewer than 6 values no rank does; then
+    it goes from the lowest to the highest.
     """
     ordered, count = sorted(values), len(values)
     rank, missed = 1, 2 / 2**count
@@ -31,12 +32,12 @@ def median_interval(values: Sequence[float]) -> Interval:
 
 
 def mean_interval(values: Sequence[float]) -> Interval:
-    """Of the mean, by the percentile bootstrap."""
+    """Return the interval of the mean, by the percentile bootstrap."""
     return _percentiles(_means(values, np.random.default_rng(0)))
 
 
 def difference_interval(ours: Sequence[float], theirs: Sequence[float]) -> Interval:
-    """Of the difference of the means of two independent samples, by the percentile bootstrap."""
+    """Return the interval of the difference of two independent means, by the percentile bootstrap."""
     rng = np.random.default_rng(0)
     return _percentiles(_means(ours, rng) - _means(theirs, rng))
 

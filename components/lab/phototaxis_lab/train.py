@@ -1,4 +1,4 @@
-"""`phototaxis train`: the same learning as over the bus, in one process."""
+"""`phototaxis train`: lets an agent learn in one process, exactly as over the bus."""
 
 import json
 from collections.abc import Sequence
@@ -21,15 +21,15 @@ class Options(Running, kw_only=True):
     arena: str = "paper"
     """name of a shipped arena, or a TOML file"""
     seed: Seed = 0
-    """decides everything: placements, noise, the learner and its exploration"""
+    """seed of all randomness: placements, noise, the learner and its exploration"""
     seeds: SEEDS = ""
     """A:B: learn with each seed from A to B − 1 and evaluate each on 200 fresh placements"""
     epochs: Annotated[int, Meta(ge=1)] = 3000
     """learning steps"""
     checkpoint: str = ""
-    """file to keep what was learned in (.npz)"""
+    """file (.npz) in which to save what was learned"""
     json: bool = False
-    """print the result as one JSON object, last on standard output"""
+    """print the result as one JSON object, as the last line of standard output"""
 
 
 def main(argv: Sequence[str]) -> int:
@@ -38,11 +38,11 @@ def main(argv: Sequence[str]) -> int:
     about = "Learn in one process, without a bus; the same seeds give the same hashes as `phototaxis up`."
     options, setup, fmus = parse_setup(Options, argv, "phototaxis train", about, {"sensor models": FmuOptions})
     if options.checkpoint and options.seeds:
-        raise UserError("--checkpoint keeps one learner, --seeds makes many; give one of the two")
+        raise UserError("--checkpoint saves one learner, but --seeds trains many; give only one of the two")
     if options.checkpoint:
         check_writable(Path(options.checkpoint), "--checkpoint")
     if options.seeds and fmus != FmuOptions():
-        raise UserError("--seeds makes many learners at once, with the built-in sensors; leave the FMU out")
+        raise UserError("--seeds trains many learners, with the built-in sensors only; leave the FMU out")
     from phototaxis_sensors.choice import choose_sensors
     from phototaxis_sim import arenas
 
@@ -60,7 +60,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def train_seed(options: Options, setup: Any, arena: Any, make: Any) -> tuple[dict[str, Any], UserError | None]:
-    """One seed: hashes, rate and, if wanted, the checkpoint; and why that could not be written."""
+    """Learn with one seed; return the result, and the error if the checkpoint could not be written."""
     from phototaxis_agent.watchdog import watchdog
 
     from phototaxis_lab.loop import train
@@ -99,7 +99,7 @@ def train_seed(options: Options, setup: Any, arena: Any, make: Any) -> tuple[dic
 
 
 def train_seeds(options: Options, setup: Any) -> dict[str, Any]:
-    """Many seeds: the success of each, and what they come to."""
+    """Learn with many seeds; return the success of each, and a summary."""
     from phototaxis_lab.cell import Cell, System
     from phototaxis_lab.grid import summary, with_progress
     from phototaxis_lab.parallel import cluster

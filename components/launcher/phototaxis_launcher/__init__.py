@@ -1,1 +1,1 @@
-"""The `phototaxis` command: starts the processes of a run, watches over them, and finds its way to the rest."""
+"""The `phototaxis` command: starts and supervises the processes of a run, and dispatches all subcommands."""

@@ -1,4 +1,4 @@
-"""`python -m phototaxis_launcher` is `phototaxis`."""
+"""Makes `python -m phototaxis_launcher` the same as `phototaxis`."""
 
 from phototaxis_launcher.cli import main
 

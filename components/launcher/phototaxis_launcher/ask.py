@@ -15,6 +15,7 @@ from phototaxis.wire.messages import Control, ControlReply, Seed, Status
 from phototaxis_launcher.progress import success
 
 ANSWERS_WITHIN_S = 2.0
+"""Seconds to wait for the simulation to appear on the bus, and again for its reply."""
 
 
 class StatusOptions(BusOptions, kw_only=True):
@@ -28,20 +29,20 @@ class ControlOptions(BusOptions, kw_only=True):
     """Options of `phototaxis control`."""
 
     verb: Literal["pause", "resume", "step", "speed", "reset", "begin", "stop"]
-    """what to do; step: one tick of a paused simulation; reset: end the episode; begin: a new run"""
+    """what to do; step: advance a paused simulation by one tick; reset: end the episode; begin: start a new run"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
     """for the verb speed: simulated seconds per second; 0: lockstep"""
     seed: Seed = 0
-    """for the verb begin: of the new run"""
+    """for the verb begin: seed of the new run"""
 
 
 def request(options: BusOptions, control: Control) -> ControlReply:
-    """Ask the simulation on the bus.
+    """Send a control request to the simulation on the bus and return its reply.
 
     Raises
     ------
     Unavailable
-        when there is none, or it does not answer.
+        when there is no simulation, or it does not answer.
     """
     with open_session("observer", options) as session, Bus(session, options.name, "observer", "ask") as bus:
         if not bus.wait_for("sim", ANSWERS_WITHIN_S):
@@ -53,7 +54,7 @@ def request(options: BusOptions, control: Control) -> ControlReply:
 
 
 def status(argv: Sequence[str]) -> int:
-    about = "Say who is alive, which tick it is, who drives, how fast, and what is awaited."
+    about = "Show which components are alive, the current tick, the driver, the speed, and what the run waits for."
     options = parse(StatusOptions, argv, "phototaxis status", about)
     found = request(options, Control(verb="status")).status
     if options.json:
@@ -64,7 +65,7 @@ def status(argv: Sequence[str]) -> int:
 
 
 def control(argv: Sequence[str]) -> int:
-    about = "Pause, resume, single-step, re-pace, reset, begin anew or stop the running simulation."
+    about = "Pause, resume, single-step or stop the simulation, change its speed, end its episode, or start a new run."
     options = parse(ControlOptions, argv, "phototaxis control", about, positional=["verb"])
     reply = request(options, Control(verb=options.verb, speed=options.speed, seed=options.seed))
     if not reply.ok:
@@ -74,7 +75,7 @@ def control(argv: Sequence[str]) -> int:
 
 
 def describe(status: Status) -> list[str]:
-    """A status in words."""
+    """Describe a status for a person, one line for each fact."""
     phase = status.phase
     if phase == "waiting":
         phase += f" for {status.waiting_for}, {status.waited:.1f} s"

@@ -24,25 +24,25 @@ class Options(Struct, kw_only=True):
     """Options of `phototaxis certs`."""
 
     out: str = "certs"
-    """folder to make; it must not exist"""
+    """folder to create; it must not exist yet"""
     worlds: WorldNames = "phototaxis"
     """names of the worlds, separated by commas"""
     host: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.:-]+$", description="a host's name or address")] = "localhost"
-    """name or IPv4 address under which the clients reach the router"""
+    """name or IPv4 address at which the clients reach the router"""
     listen: Annotated[str, Meta(pattern=r"^[0-9a-fA-F.:]+$", description="an address in numbers")] = "127.0.0.1"
-    """address that the router listens on; 0.0.0.0: all of its machine's"""
+    """address that the router listens on; 0.0.0.0: all addresses of its machine"""
     port: Annotated[int, Meta(ge=1, le=65535)] = 7447
     """port of the router"""
 
 
 def main(argv: Sequence[str]) -> int:
     about = (
-        "Make a certificate authority for trials, a certificate and a password for every component, and the Zenoh "
-        "configurations of a router that knows them and of its clients."
+        "Make a certificate authority for trials, a certificate and a password for every component, and Zenoh "
+        "configurations for a router that accepts them and for its clients."
     )
     options = parse(Options, argv, "phototaxis certs", about)
     if ":" in options.host:
-        raise UserError(f"--host {options.host}: Zenoh's TLS knows names and IPv4 addresses; give one of these")
+        raise UserError(f"--host {options.host}: Zenoh's TLS accepts only host names and IPv4 addresses; give one")
     folder = Path(options.out).resolve()
     if folder.exists():
         raise UserError(f"--out {options.out}: exists already; remove it or choose another folder")
@@ -62,7 +62,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def make(folder: Path, worlds: Sequence[str], host: str, listen: str, port: int) -> None:
-    """Everything, in an existing folder; private keys and passwords are readable by their owner alone."""
+    """Write all files into an existing folder; only their owner can read them."""
     import trustme
 
     authority = trustme.CA(organization_name="Phototaxis trials")
@@ -71,15 +71,15 @@ def make(folder: Path, worlds: Sequence[str], host: str, listen: str, port: int)
     _certify(authority.issue_cert(*{host, "localhost", "127.0.0.1"}), folder, "router")
     passwords = {name: secrets.token_urlsafe(18) for name in names}
     _write(folder / "users.txt", "".join(f"{name}:{word}\n" for name, word in passwords.items()).encode())
-    door, here = f"tls/{f'[{listen}]' if ':' in listen else listen}:{port}", f"tls/{host}:{port}"
+    listen_at, connect_to = f"tls/{f'[{listen}]' if ':' in listen else listen}:{port}", f"tls/{host}:{port}"
     ways: tuple[Auth, ...] = ("mtls", "password")
     for auth in ways:
-        config = router_config(worlds, [door], folder, auth)
+        config = router_config(worlds, [listen_at], folder, auth)
         _write(folder / f"router-{auth}.json5", text(config, MADE_BY).encode())
     for name in names:
         _certify(authority.issue_cert(f"{name}.example", common_name=name), folder, name)
         for auth in ways:
-            config = client_config(here, folder, name, auth, passwords[name])
+            config = client_config(connect_to, folder, name, auth, passwords[name])
             _write(folder / f"{name}.{auth}.json5", text(config, MADE_BY).encode())
 
 

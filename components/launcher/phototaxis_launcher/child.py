@@ -1,4 +1,4 @@
-"""Child processes: started, watched, restarted when they die, and always ended."""
+"""Child processes of the launcher: it starts and watches them, restarts those that die, and ends them all."""
 
 import os
 import subprocess
@@ -14,28 +14,28 @@ from phototaxis.runtime.errors import ERROR, WARNING, ComponentFailed, Unavailab
 
 MAX_RESTARTS = 3
 WITHIN_S = 20.0
-"""A component that dies more than RESTARTS times within this many seconds keeps dying."""
+"""The launcher gives up on a component that dies more than MAX_RESTARTS times within this many seconds."""
 USER_ERRORS = {2: UserError, 3: Unavailable, 4: ComponentFailed}
-"""Exit codes by which a component says in a line why it ends; it is not restarted, it would end the same."""
+"""Exit codes of a component that has explained in one line why it ends. A restart would end the same way."""
 
 
 class Child:
-    """One component process; its stderr goes to a file.
+    """One component process; its output goes to a log file.
 
-    It is tethered: when this process ends, however it ends, the child's standard input closes and the
-    child leaves.
+    The child is tethered: when the launcher ends, even by a crash, the child's standard input closes and the
+    child ends too.
 
     Parameters
     ----------
-    name : names its log file, and it in messages.
-    module : Python module that is its program.
-    label : if given, each start gets a name on the bus that begins with it.
-    may_leave : whether it may end by itself, without an error; otherwise it is restarted then too.
+    name : the component's name in messages, and the name of its log file.
+    module : Python module to run.
+    label : if given, each start of the process gets a fresh name on the bus that begins with this label.
+    may_leave : whether the process may end by itself without an error; if not, the launcher then restarts it.
 
     Attributes
     ----------
-    idents : the names on the bus that it had, the newest last.
-    left : it ended by itself, without an error.
+    idents : all names that the child has had on the bus, the newest last.
+    left : whether the child ended by itself, without an error.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Child:
         self.process: subprocess.Popen[bytes] | None = None
 
     def start(self, *extra: str) -> None:
-        """Start the process in a session of its own, so that Ctrl-C reaches the launcher alone."""
+        """Start the process in a session of its own, so that Ctrl-C reaches only the launcher."""
         if self.label:
             self.idents.append(unique_name(self.label))
             extra = *extra, f"--ident={self.idents[-1]}"
@@ -62,7 +62,7 @@ class Child:
                 stdout=log,
                 stderr=log,
                 start_new_session=True,
-                env=os.environ | {"PYTHONFAULTHANDLER": "1"},  # where a crash happened, in the log
+                env=os.environ | {"PYTHONFAULTHANDLER": "1"},  # so that the log shows where a crash happened
             )
 
     def _open_log(self) -> IO[bytes]:
@@ -72,14 +72,16 @@ class Child:
             raise write_failure(self._log, error) from None
 
     def watch(self) -> bool:
-        """Restart the process if it has died; whether it had to. One that may leave and did has `left`.
+        """Restart the process if it has died, and return whether it was restarted.
+
+        If the process may leave and has ended without an error, set `left` instead.
 
         Raises
         ------
         UserError, Unavailable, ComponentFailed
-            when it ended with a line that says why.
+            when the process explained in one line why it ended.
         ComponentFailed
-            also when it keeps dying; the text ends with its stderr.
+            also when the process keeps dying; the text ends with its last output.
         """
         if self.process is None or self.process.poll() is None:
             return False
@@ -93,12 +95,12 @@ class Child:
         return True
 
     def bring_back(self) -> None:
-        """Start it again after it has ended though it should not.
+        """Restart the process after an unexpected end.
 
         Raises
         ------
         ComponentFailed
-            when it keeps dying; the text ends with its stderr.
+            when the process keeps dying; the text ends with its last output.
         """
         if self.process is None:
             return
@@ -108,14 +110,14 @@ class Child:
             words = self.last_words()
             raise ComponentFailed(
                 f"{who} died {len(self._deaths)} times, last with {_meaning(self.process.returncode)}; "
-                + (f"its last words:\n{words}" if words else "it said nothing")
+                + (f"its last output:\n{words}" if words else "it printed nothing")
             )
         self.left = False
         self.restarts += 1
         self.start("--restarted")
 
     def stop(self, timeout: float) -> None:
-        """Ask the process to end, and end it when it does not within `timeout` seconds."""
+        """Terminate the process, and kill it if it still runs after `timeout` seconds."""
         if self.process is None:
             return
         if self.process.poll() is None:
@@ -133,7 +135,7 @@ class Child:
             self.process.stdin.close()
 
     def warnings(self) -> list[str]:
-        """The warnings (`phototaxis.runtime.errors.warn`) that it wrote since this was asked last."""
+        """Return the warnings (`phototaxis.runtime.errors.warn`) in the log since the previous call."""
         try:
             with self._log.open("rb") as log:
                 log.seek(self._read)
@@ -146,12 +148,12 @@ class Child:
         return [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
 
     def last_words(self) -> str:
-        """What it wrote before it died; of a crash in compiled code, where that was."""
+        """Return the last output before the process died; after a crash in compiled code, the place of the crash."""
         fatal = self.tail(100).rpartition("Fatal Python error")
         return "\n".join((fatal[1] + fatal[2]).splitlines()[:6]) if fatal[1] else self.tail(20)
 
     def fault(self) -> str:
-        """The line with which it ended because of something that the user can mend; "" when it did not."""
+        """Return the line in which the process explained its end (see `USER_ERRORS`), or "" if it gave none."""
         if self.process is None or self.process.returncode not in USER_ERRORS:
             return ""
         said = [line for line in self.tail(20).splitlines() if line.startswith(ERROR)]
@@ -167,7 +169,7 @@ class Child:
         return f"see {self._log}"
 
     def tail(self, lines: int) -> str:
-        """The last lines it wrote."""
+        """Return the last `lines` lines of the log."""
         try:
             return "\n".join(self._log.read_text(errors="replace").splitlines()[-lines:])
         except FileNotFoundError:

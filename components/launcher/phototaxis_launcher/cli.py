@@ -1,4 +1,4 @@
-"""The one command line: a table of subcommands, each loaded when it is called."""
+"""The `phototaxis` command line: a table of subcommands, each imported only when it is called."""
 
 import re
 import sys
@@ -17,27 +17,28 @@ class Verb(NamedTuple):
     """One subcommand."""
 
     target: str
-    """module:function, called with the words after the verb."""
+    """`module:function`; the function is called with the words after the verb."""
     extra: str
-    """The extra that brings what it needs."""
+    """The package extra that installs what the subcommand needs."""
     about: str
+    """What the subcommand does, in a line for the list of subcommands."""
 
 
 VERBS = {
     "demo": Verb("phototaxis_launcher.demo:main", "demo", "learn 3,000 epochs over the bus, watch, evaluate"),
     "up": Verb("phototaxis_launcher.up:main", "launcher", "start a run: sim, sensors, agent, recorder"),
     "status": Verb(
-        "phototaxis_launcher.ask:status", "launcher", "who is alive, which tick, who drives, what is awaited"
+        "phototaxis_launcher.ask:status", "launcher", "who is alive, which tick, who drives, what the run waits for"
     ),
     "control": Verb("phototaxis_launcher.ask:control", "launcher", "pause, resume, step, speed, reset, begin, stop"),
     "swap": Verb("phototaxis_launcher.swap:main", "launcher", "hand the seat to another learner while the robot runs"),
     "router": Verb("phototaxis_launcher.router:main", "launcher", "a Zenoh router, for components on several machines"),
     "certs": Verb("phototaxis_launcher.certs:main", "certs", "certificates and passwords for a guarded router"),
     "check": Verb(
-        "phototaxis_lab.check:main", "lab", "an agent against the contract; rights and wire format against the code"
+        "phototaxis_lab.check:main", "lab", "test an agent against the contract; compare committed files with the code"
     ),
     **{name: Verb(f"phototaxis_{name}.__main__:main", name, role.about) for name, role in COMPONENTS.items()},
-    "fmu": Verb("phototaxis_fmu.cli:main", "fmu", "look into, check or build FMUs (sensor models)"),
+    "fmu": Verb("phototaxis_fmu.cli:main", "fmu", "inspect, check or build FMUs (sensor models)"),
     "view": Verb("phototaxis_recorder.view:main", "recorder", "the live view or a recording, in a window or browser"),
     "recordings": Verb("phototaxis_recorder.recordings:main", "recorder", "list recordings; remove old ones"),
     "health": Verb("phototaxis_launcher.health:main", "launcher", "is this component on the bus? for health checks"),
@@ -76,13 +77,13 @@ def dispatch(words: list[str]) -> int:
 
 
 def extra_with(package: str, usual: str) -> str:
-    """An extra that brings a package: the usual one, unless another names it."""
+    """Return an extra that installs `package`: `usual`, unless only another extra names the package."""
     lines = requires("phototaxis") or []
     found = [match[1] for line in lines if (match := re.match(rf"{package}\b.*extra == .([\w-]+)", line))]
     return usual if not found or usual in found else found[0]
 
 
 def usage() -> str:
-    """The list of subcommands."""
+    """Return the help text that lists the subcommands."""
     rows = [f"  {name:10} {verb.about}" for name, verb in VERBS.items()]
     return "\n".join(["usage: phototaxis COMMAND [OPTIONS]   (each has --help)", "", *rows])

@@ -1,4 +1,4 @@
-"""`phototaxis demo`: the whole story in one command, from a clone to a measured policy."""
+"""`phototaxis demo`: a run that learns, a live view to watch it, and an evaluation of the policy, in one command."""
 
 import json
 import math
@@ -23,14 +23,15 @@ from phototaxis_launcher.show import Show
 from phototaxis_launcher.up import Run
 
 TICKS_PER_SECOND = 10.0
-"""What eyes can follow."""
+"""Speed of the slow parts, at which a person can follow the robot."""
 FIRST_EPOCHS, LAST_EPOCHS = 150, 300
-"""Epochs at the beginning and at the end of learning that are shown slowly."""
+"""Epochs at the beginning and at the end of learning that the demo shows slowly."""
 SEEN = f"""\
-What is to be seen: on the left the arena with its light, the robot with its sonar rays, its trail coloured by reward;
+What you see: on the left the arena with its light, the robot with its sonar rays, and its trail, coloured by reward;
 in the middle the share of episodes that reached the light, rewards and light; on the right what the robot has learned.
 The first and the last part are shown slowly, {TICKS_PER_SECOND:g} steps a second."""
 PLACEMENTS = 200
+"""Random placements from which the demo measures the learned policy."""
 PAPER_EPOCHS = 3000
 """Learning steps after which the paper measures its Q-table on the simple percept."""
 
@@ -45,22 +46,22 @@ def main(argv: Sequence[str]) -> int:
     if options.json:
         print(json.dumps({**result, "evaluation": show.found}), flush=True)
     elif show.found is None:
-        print("stopped before the end; nothing is evaluated", file=sys.stderr)
+        print("the run was stopped before its end, so its policy is not evaluated", file=sys.stderr)
         print(*run_paths(result), sep="\n", file=sys.stderr)
     return run.end(status)
 
 
 class Story(Show):
-    """The run as a newcomer watches it: slow at first, at full speed, slow again; then what came of it.
+    """Presents a run to a newcomer: slow at first, then at full speed, then slow again; then evaluates the policy.
 
     Parameters
     ----------
-    stays : the viewer stays up until Ctrl-C.
-    paced : the run begins slowly, learns at full speed, and ends slowly.
+    stays : whether the viewer stays up until Ctrl-C after the run.
+    paced : whether the beginning and the end of the run are slow; if not, all of it runs at its own speed.
 
     Attributes
     ----------
-    found : what the evaluation of the learned policy gave, or None.
+    found : the result of the evaluation as `phototaxis evaluate --json` prints it, or None.
     """
 
     def __init__(self, options: UpOptions, fmus: FmuOptions, stays: bool, paced: bool):
@@ -72,13 +73,14 @@ class Story(Show):
         self.found: dict[str, Any] | None = None
 
     def wait(self) -> float:
-        """Seconds until the next step is due."""
+        """Return the seconds until the next step or pause is due."""
         return min(max(min(self._step_at, self._pause_at) - time.monotonic(), 0.0), super().wait())
 
     def beat(self, bus: Bus) -> None:
-        """Pause where the last chapter begins; make one step of the paused run where one is due.
+        """Pause the run when the last chapter begins, and step the paused run when a step is due.
 
-        Unlike a clock, a step waits for a late answer, so the learner learns what it learns at full speed.
+        The slow parts are single steps because a step waits for a late answer, as lockstep does, and a clock does
+        not: so the learner learns the same as at full speed.
         """
         now = time.monotonic()
         if now >= self._pause_at:
@@ -89,7 +91,7 @@ class Story(Show):
             self._step_at = max(self._step_at + 1 / TICKS_PER_SECOND, now)
 
     def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
-        """Change the speed where a chapter ends, and say what is to be seen in the next."""
+        """Change the speed when a chapter ends, and announce the next chapter."""
         now = time.monotonic()
         (then, epoch), self._before = self._before, (now, status.epoch)
         if not self._paced:
@@ -106,7 +108,7 @@ class Story(Show):
             bus.control(Control(verb="resume"))
         elif self._chapter == 2:
             made = status.epoch - epoch
-            if status.epoch + made >= self._slow_from:  # the next status would come too late
+            if status.epoch + made >= self._slow_from:  # the next status will come after that epoch
                 self._pause_at = now + max(self._slow_from - status.epoch, 0) / max(made, 1) * (now - then)
                 self._turn(progress, f"It has learned: watch it turn to the light, until epoch {status.epochs}.")
 
@@ -115,7 +117,7 @@ class Story(Show):
         progress.say(f"{self._chapter}. {text}")
 
     def finished(self, result: dict[str, Any]) -> bool:
-        """Measure the policy, say what came of it, and keep the viewer up where somebody may watch."""
+        """Evaluate the policy, print a summary, and return whether the viewer stays up."""
         checkpoint = result["checkpoint"]
         self.found = self._evaluate(checkpoint) if checkpoint else None
         if not self._options.json:
@@ -123,12 +125,12 @@ class Story(Show):
         return self._stays
 
     def _evaluate(self, checkpoint: str) -> dict[str, Any]:
-        """What `phototaxis evaluate` finds.
+        """Run `phototaxis evaluate` and return its result.
 
         Raises
         ------
         ComponentFailed
-            when it fails.
+            when the evaluation fails.
         """
         words = [f"--arena={self._options.arena}", f"--placements={PLACEMENTS}", "--json", *flags(self._fmus)]
         evaluate = [sys.executable, "-m", "phototaxis_launcher", "evaluate", checkpoint, *words]
@@ -152,7 +154,7 @@ class Story(Show):
 
 
 def is_the_papers(meta: CheckpointMetadata, options: UpOptions, fmus: FmuOptions) -> bool:
-    """Whether a run was of the system for which the paper reports its 80%."""
+    """Whether the run used the system for which the paper reports its 80% (section 6.2)."""
     system = (meta.learner, meta.percept, meta.arena, options.epochs, options.robots, options.swap)
     return (
         system == ("qtable", "simple", "paper", PAPER_EPOCHS, 1, "")

@@ -1,4 +1,4 @@
-"""The folder of a run."""
+"""The folder that holds the recording, checkpoints and logs of a run."""
 
 import shutil
 from collections.abc import Iterator
@@ -11,21 +11,21 @@ from phototaxis.wire.messages import run_name
 
 
 class RunFolder:
-    """A fresh folder in `out` that is called as its run; of runs that start at the same moment each has its own.
+    """Makes a fresh folder in `out`, named after its run; runs that start at the same moment get different folders.
 
     Attributes
     ----------
-    begun : whether the run has begun, so that there is something to keep.
+    begun : whether the run has begun, so that the folder holds something to keep.
 
     Raises
     ------
     UserError, Unavailable
-        when it cannot be made, or the disk is full.
+        when the folder cannot be made, or the disk is full.
     """
 
     def __init__(self, out: Path):
         self._made = [part for part in (out.resolve(), *out.resolve().parents) if not part.exists()]
-        check_folder_writable(out, "--out", keep=True)  # taken away again, it might be missing to a run that starts now
+        check_folder_writable(out, "--out", keep=True)  # removing it could break another run that starts now
         self.path = self._fresh(out.resolve())
         self.begun = False
 
@@ -36,16 +36,16 @@ class RunFolder:
 
     @property
     def recordings(self) -> list[Path]:
-        """All recordings that there are, the newest last."""
+        """All recordings in the folder, the newest last."""
         return sorted(self.path.glob("recording*.rrd"), key=lambda file: file.stat().st_mtime)
 
     def checkpoint(self, agent: str) -> Path:
-        """That of the agent with this name among the launcher's processes."""
+        """Path of the checkpoint of an agent; `agent` is the name of its process, as in "agent-2"."""
         return self.path / f"{agent.replace('agent', 'checkpoint')}.npz"
 
     @contextmanager
     def kept_once_begun(self) -> Iterator[None]:
-        """Remove the folder when the user's input or a missing peer keeps the run from beginning."""
+        """Remove the folder if the run fails before it begins because of the user's input or a missing peer."""
         try:
             yield
         except UserError as error:
@@ -54,7 +54,7 @@ class RunFolder:
             raise
 
     def remove(self) -> None:
-        """Take the folder away with all that is in it, and what had to be made for it where nothing else is in it."""
+        """Remove the folder and its content, and those of its parents that were made for it and are empty."""
         shutil.rmtree(self.path, ignore_errors=True)
         with suppress(OSError):
             for part in self._made:
@@ -67,7 +67,7 @@ class RunFolder:
             try:
                 folder.mkdir()
                 return folder
-            except (FileExistsError, FileNotFoundError):  # another run took the name, or `out` away
+            except (FileExistsError, FileNotFoundError):  # another run took the name, or removed `out`
                 continue
             except OSError as error:
                 raise write_failure(folder, error) from None

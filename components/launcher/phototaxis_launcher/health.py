@@ -1,4 +1,4 @@
-"""`phototaxis health`: does this component take part in the bus? For the health checks of containers."""
+"""`phototaxis health`: tells a container's health check whether a component is on the bus."""
 
 import time
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from phototaxis.runtime.session import BusOptions, open_session
 from phototaxis.wire.messages import Control
 
 ANSWERS_WITHIN_S = 3.0
-"""A component of which nothing is heard for so long is not healthy."""
+"""Seconds after which a component that has not shown itself on the bus counts as unhealthy."""
 ROLES = ("router", *COMPONENTS)
 
 
@@ -20,9 +20,9 @@ class Options(BusOptions, kw_only=True):
     """Options of `phototaxis health`."""
 
     role: str
-    """router: the bus can be entered; sim: its token is there, and it answers; another component: its token is there"""
+    """what to check; router: a session can be opened; sim: it is on the bus and answers; others: on the bus"""
     label: str = ""
-    """the component's own --label (default: any component of that role)"""
+    """the --label of the component (default: any component of that role)"""
 
 
 def main(argv: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""Where everything of a run is, and how to look at it again."""
+"""Tells a person where the files of a run are, and how to look at them again."""
 
 import os
 import shlex
@@ -9,7 +9,7 @@ from typing import Any
 
 
 def run_paths(result: dict[str, Any]) -> list[str]:
-    """Where everything of a run is, and how to look at it again, in lines for a person."""
+    """Return lines for a person: the files of a run, and the commands that open them."""
     lines = []
     if recording := result["recording"]:
         lines += [f"recording   {recording}", f"            look again: {program()} view {shown(recording)}"]
@@ -21,11 +21,11 @@ def run_paths(result: dict[str, Any]) -> list[str]:
 
 
 def program() -> str:
-    """How this program is called from here."""
+    """Return the command that calls this program: `phototaxis` if it is on the PATH, else its path."""
     own = Path(sys.executable).parent / "phototaxis"
     return "phototaxis" if shutil.which("phototaxis") == str(own) or not own.exists() else shown(str(own))
 
 
 def shown(file: str) -> str:
-    """A file's path as a person at this place would type it."""
+    """Return the path of a file as a person types it here: the shorter of relative and absolute."""
     return shlex.quote(min(file, os.path.relpath(file), key=len))

@@ -1,4 +1,4 @@
-"""The processes of a run: one for each component of the table of roles, and any number of agents."""
+"""The processes of a run: one for each component in the table of roles, and any number of agents."""
 
 from phototaxis.runtime.errors import Unavailable, UserError
 from phototaxis.runtime.fmu import FmuOptions
@@ -12,17 +12,17 @@ from phototaxis_launcher.options import UpOptions, learner_of, successor, swap_p
 
 
 class Processes:
-    """The children of a launcher.
+    """The child processes of a launcher.
 
     Parameters
     ----------
     words : options of the first agent.
-    ports : those of the recorder, for Rerun and for its page; without them nothing is recorded.
+    ports : ports of the recorder, for gRPC and for its web page; if empty, there is no recorder.
 
     Attributes
     ----------
-    children : by role; of the agents the first.
-    agents : all of them: the first, and those that take over from it.
+    children : the first process of each role.
+    agents : all agents: the first, and those that take over from it.
     """
 
     def __init__(self, options: UpOptions, fmus: FmuOptions, words: list[str], folder: RunFolder, ports: list[int]):
@@ -56,7 +56,7 @@ class Processes:
         return self.agents[-1]
 
     def another_agent(self, words: list[str]) -> Child:
-        """Start one more agent, which takes the seat over as soon as it can."""
+        """Start one more agent, which takes over the seat as soon as it can."""
         child = self._agent(successor(self._words, words), "--take-over")
         child.start()
         return child
@@ -66,23 +66,23 @@ class Processes:
         return [*(child for child in self.children.values() if child not in self.agents), *self.agents]
 
     def start(self) -> None:
-        """Start all but the first agent, which joins when the others are there."""
+        """Start all processes except the first agent, which starts when the others are on the bus."""
         for name, role in COMPONENTS.items():
             for child in self._of(name)[1 if role.joins_last else 0 :]:
                 child.start()
 
     def missing(self, status: Status) -> list[str]:
-        """Whom the first agent still waits for: who is not on the bus, or has not asked for its turn."""
+        """Name what the first agent still waits for: components not yet on the bus, else agents not yet queued."""
         joined = {who.split("/")[0] for who in status.alive}
         absent = {role for role in self.children if not COMPONENTS[role].joins_last} - joined
         return sorted(absent) or [agent.name for agent in self.agents[1:] if not {*agent.idents} & {*status.next}]
 
     def complete(self, status: Status) -> bool:
-        """Whether all are on the bus."""
+        """Whether every role is on the bus."""
         return self.children.keys() <= {who.split("/")[0] for who in status.alive}
 
     def stop(self) -> None:
-        """End every process, in the opposite order."""
+        """End every process, in the reverse order of the start."""
         for name, role in reversed(COMPONENTS.items()):
             for child in self._of(name):
                 child.stop(role.ends_within_s)
@@ -91,10 +91,10 @@ class Processes:
         return self.agents if role == "agent" else [self.children[role]] if role in self.children else []
 
     def go_on_without_recorder(self, error: UserError) -> None:
-        """Forget the recorder, which has ended before the run."""
+        """Drop the recorder, which has ended with `error`, and keep the error for the result."""
         del self.children["recorder"]
         self._lost.append(error)
 
     def faults(self) -> list[UserError]:
-        """What ended before its time, or could not be saved to its end."""
+        """Return the errors of processes that ended too early or could not save everything."""
         return [*self._lost, *(Unavailable(fault) for child in self.all() if (fault := child.fault()))]

@@ -1,4 +1,4 @@
-"""How a run is doing: a bar on a terminal, plain lines elsewhere; all on stderr."""
+"""Shows the progress of a run on stderr: a bar on a terminal, plain lines elsewhere."""
 
 import sys
 import time
@@ -6,10 +6,11 @@ import time
 from phototaxis.wire.messages import Status
 
 LINE_EVERY_S = 2.0
+"""Seconds between two plain lines."""
 
 
 class Progress:
-    """Shows statuses as they come."""
+    """Shows each new status of a run, and news lines between them."""
 
     def __init__(self, epochs: int):
         from tqdm import tqdm
@@ -18,7 +19,7 @@ class Progress:
         self._bar = tqdm(total=epochs or None, unit=" epochs", dynamic_ncols=True) if sys.stderr.isatty() else None
 
     def show(self, status: Status) -> None:
-        """Bring the display up to date."""
+        """Update the display with a status."""
         facts = (
             f"{success(status)}, {status.rate:.0f} ticks/s"
             if status.phase != "waiting"
@@ -34,7 +35,7 @@ class Progress:
             print(f"epoch {status.epoch}{total}  {facts}", file=sys.stderr, flush=True)
 
     def say(self, text: str) -> None:
-        """One line of news."""
+        """Print one line of news."""
         if self._bar is not None:
             self._bar.write(text, file=sys.stderr)
         else:
@@ -46,7 +47,7 @@ class Progress:
 
 
 def success(status: Status) -> str:
-    """How many of the newest episodes reached the light, in words."""
+    """Say in words how many of the newest episodes reached the light."""
     if not status.episodes:
         return "no episode has ended yet"
     if status.episodes == 1:

@@ -1,4 +1,4 @@
-"""What a run came to: its result for programs, a summary for people, and its exit code."""
+"""The outcome of a run: a result for programs, a summary for people, and an exit code."""
 
 from typing import Any
 
@@ -12,11 +12,14 @@ from phototaxis_launcher.paths import run_paths
 from phototaxis_launcher.processes import Processes
 
 MAX_LATE_SHARE = 0.95
-"""Share of ticks without a command in time from which on a run in real time has failed."""
+"""A run in real time has failed when a larger share of its ticks had no command in time."""
 
 
 def result(status: Status, options: UpOptions, folder: RunFolder, processes: Processes) -> dict[str, Any]:
-    """What the run came to; the learner is the one that drove last, if that is one of ours."""
+    """Return the outcome of a run as plain data.
+
+    Learner and checkpoint are those of the last driver; they are None if the launcher did not start it.
+    """
     agents = {ident: agent for agent in processes.agents for ident in agent.idents}
     last = agents.get(status.drivers[-1].driver) if status.drivers else None
     unsaved = last is None or last.fault() or not folder.checkpoint(last.name).exists()
@@ -58,7 +61,7 @@ def result(status: Status, options: UpOptions, folder: RunFolder, processes: Pro
 
 
 def summary(result: dict[str, Any]) -> list[str]:
-    """The result in lines for a person."""
+    """Describe a result in lines for a person."""
     line = (
         f"{result['epochs']} epochs, {result['episodes']} episodes, {result['reached']} of them reached the light; "
         f"{result['ticks_per_second']} ticks/s"
@@ -68,13 +71,13 @@ def summary(result: dict[str, Any]) -> list[str]:
 
 
 def exit_code(status: Status, processes: Processes, interrupted: bool) -> int:
-    """The exit code of a run whose result is told.
+    """Return the exit code of a run, after its result is printed.
 
     Raises
     ------
     UserError
-        for what did not keep the run from its end: a recording or a checkpoint that could not be written, or a
-        robot that stood still since no command came in time.
+        for faults that did not end the run: a recording or a checkpoint could not be written, or the robot stood
+        still because no command came in time.
     """
     for fault in processes.faults():
         raise fault
@@ -84,6 +87,6 @@ def exit_code(status: Status, processes: Processes, interrupted: bool) -> int:
         part = "sensors" if 2 * status.late_sensors > status.late else "agent"
         line = f"only {status.tick - status.late} of {status.tick} ticks had a command in time"
         raise ComponentFailed(
-            f"{line}, the robot stood still: the {part} cannot keep up; lower --speed (0: as fast as it goes)"
+            f"{line}, the robot stood still: the {part} cannot keep up; lower --speed (0: as fast as possible)"
         )
     return 0

@@ -1,4 +1,4 @@
-"""`phototaxis router`: a Zenoh router, for components that are not on one machine."""
+"""`phototaxis router`: a Zenoh router, for components on several machines."""
 
 import signal
 import sys
@@ -14,10 +14,10 @@ class Options(BusOptions, kw_only=True):
 
 
 def main(argv: Sequence[str]) -> int:
-    about = "A Zenoh router (zenohd does the same): the one place that components on several machines connect to."
+    about = "Run a Zenoh router (zenohd does the same), to which components on several machines connect."
     options = parse(Options, argv, "phototaxis router", about)
     ends = {signal.SIGTERM, signal.SIGINT}
-    signal.pthread_sigmask(signal.SIG_BLOCK, ends)  # a handler's word is lost when it comes just before we wait for it
+    signal.pthread_sigmask(signal.SIG_BLOCK, ends)  # blocked signals stay pending, so sigwait misses none
     with open_router(options) as session:
         print(f"router {session.zid()} is up", file=sys.stderr, flush=True)
         ended_by = signal.sigwait(ends)

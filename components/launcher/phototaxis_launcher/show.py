@@ -1,4 +1,4 @@
-"""What a run shows to those who watch it."""
+"""Hooks through which a run is presented to people who watch it."""
 
 from typing import Any
 
@@ -9,18 +9,18 @@ from phototaxis_launcher.progress import Progress
 
 
 class Show:
-    """What happens for those who watch a run: by default nothing."""
+    """Called by a run as it proceeds; this base class shows nothing."""
 
     def wait(self) -> float:
-        """Seconds until `beat` is to be called, at most."""
+        """Return the most seconds until the run calls `beat` again."""
         return 0.1
 
     def beat(self, bus: Bus) -> None:
-        """Time has passed, or something has come."""
+        """Called after each event and after each wait."""
 
     def follow(self, status: Status, bus: Bus, progress: Progress) -> None:
-        """A status has come."""
+        """Called with each new status."""
 
     def finished(self, result: dict[str, Any]) -> bool:
-        """The run has come to this result; whether everything stays up until it is stopped."""
+        """Called with the result of a finished run; return whether all processes stay up until they are stopped."""
         return False

@@ -1,4 +1,4 @@
-"""`phototaxis swap`: another learner takes the seat of a running system."""
+"""`phototaxis swap`: lets another learner take over the seat of a running system."""
 
 import json
 import sys
@@ -18,20 +18,20 @@ LINKED_WITHIN_S = 2.0
 
 
 class Options(BusOptions, kw_only=True):
-    """Options of `phototaxis swap`. Those of `phototaxis agent` are understood too and given to the new agent."""
+    """Options of `phototaxis swap`; options of `phototaxis agent` are accepted too and passed on to the new agent."""
 
     learner: str
     """name of the learner that takes over"""
     timeout: Annotated[float, Meta(gt=0, le=3600)] = 60.0
-    """seconds within which it must drive"""
+    """seconds within which the new agent must drive"""
     json: bool = False
-    """print the answer as one JSON object"""
+    """print the result as one JSON object"""
 
 
 def main(argv: Sequence[str]) -> int:
     parser = Parser(
         prog="phototaxis swap",
-        description="Hand the seat of a running system to a new agent, which inherits from one of its own kind.",
+        description="Hand the seat of a running system to a new agent, which inherits from a driver of the same kind.",
         epilog="Options of `phototaxis agent` (see its --help) are passed on to the agent.",
     )
     add_options(parser, Options, positional=["learner"])
@@ -66,14 +66,14 @@ def _ask(options: Options, request: LaunchRequest) -> LaunchReply:
 
 
 def what_delays(status: Status) -> str:
-    """Why a new agent does not drive at once, in words; "" when nothing keeps it.
+    """Say why a new agent does not drive at once; "" when nothing delays it.
 
     Raises
     ------
     Unavailable
-        when it never drives, since the run is finished.
+        when the run is finished, so that the agent would never drive.
     """
     if status.phase == "finished":
-        raise Unavailable(f"the run {status.run} is finished: nobody takes its seat any more")
+        raise Unavailable(f"the run {status.run} is finished: nobody can take its seat any more")
     resume = "the simulation is paused; the new agent drives when it goes on: phototaxis control resume"
     return resume if status.phase == "paused" else ""

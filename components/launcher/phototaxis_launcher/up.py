@@ -1,4 +1,4 @@
-"""`phototaxis up`: the processes of a run, brought up, watched and ended together."""
+"""`phototaxis up`: starts the processes of a run, supervises them, and ends them together."""
 
 import json
 import signal
@@ -27,7 +27,7 @@ from phototaxis_launcher.show import Show
 from phototaxis_launcher.watch import Watch
 
 ANSWERED_WITHIN_S = 5.0
-"""Seconds that the simulation gets to pause, and the driver to answer the last tick of a run that is stopped."""
+"""When a run is stopped: seconds for the simulation to pause, and for the driver to answer the last tick."""
 STARTING_S = 60.0
 """Seconds within which all components must be on the bus."""
 
@@ -45,7 +45,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 class Run:
-    """One run of the system: its processes, and the loop that follows it from the first status to the last."""
+    """One run of the system: its processes, and the loop that follows its statuses from the first to the last."""
 
     def __init__(self, options: UpOptions, fmus: FmuOptions, words: list[str], show: Show | None = None):
         self._options, self._show = options, show or Show()
@@ -61,10 +61,10 @@ class Run:
         self._interrupted = False
 
     def go(self) -> Status:
-        """Start, watch until finished or stopped, end; the last status.
+        """Start the processes, follow the run until it is finished or stopped, end them; return the last status.
 
-        The agent is started when everyone else is on the bus, so that the recording has every tick. A run that is
-        stopped is paused first: status, checkpoints and recording then end with the same tick.
+        The agent starts when everyone else is on the bus, so that the recording has every tick. A run that is
+        stopped is paused first, so that status, checkpoints and recording end with the same tick.
         """
         with (
             self._folder.kept_once_begun(),
@@ -82,11 +82,11 @@ class Run:
                     self._processes.stop()
 
     def result(self, status: Status) -> dict[str, Any]:
-        """What the run came to."""
+        """Return the outcome of the run as plain data."""
         return result(status, self._options, self._folder, self._processes)
 
     def end(self, status: Status) -> int:
-        """The exit code of a run whose result is told; raises as `exit_code` does."""
+        """Return the exit code, after the result is printed; raises as `exit_code` does."""
         return exit_code(status, self._processes, self._interrupted)
 
     def _stop_on_signals(self, bus: Bus) -> None:
@@ -98,7 +98,7 @@ class Run:
             signal.signal(number, stop)
 
     def _follow(self, bus: Bus) -> Status:
-        """From the first status to the last."""
+        """Handle events until the run is finished or stopped; return the last status."""
         status, deadline = Status(run=self._folder.run, phase="waiting"), time.monotonic() + STARTING_S
         while not self._complete(status) and not self._processes.children["sim"].left:
             event = bus.receive(timeout=self._show.wait())
@@ -121,11 +121,11 @@ class Run:
         return status
 
     def _complete(self, status: Status) -> bool:
-        """Finished, and all are there to take part in the ending (one may just have been restarted)."""
+        """Whether the run is finished and all components are on the bus to end with it (one may just be restarting)."""
         return status.phase == "finished" and self._processes.complete(status)
 
     def _take(self, status: Status, bus: Bus) -> None:
-        """Hand a status to all who follow the run."""
+        """Pass a status to everything that follows the run."""
         self._folder.begun = self._folder.begun or status.tick > 0
         self._news.follow(status)
         self._requests.confirm(status)
@@ -133,7 +133,7 @@ class Run:
         self._show.follow(status, bus, self._progress)
 
     def _start_agent(self, status: Status, deadline: float) -> None:
-        """Start the first agent when the others are there."""
+        """Start the first agent as soon as the others are on the bus."""
         if missing := self._processes.missing(status):
             if time.monotonic() > deadline:
                 who = ", ".join(missing)
@@ -144,9 +144,9 @@ class Run:
             self._progress.say(f"watch at {self._url}")
 
     def _linger(self, bus: Bus) -> None:
-        """Keep everything up, for those who watch, until a signal or until the simulation is stopped."""
+        """Keep all processes up, for those who watch, until a signal comes or the simulation is stopped."""
         where = self._url or f"{program()} view"
-        print(f"Still to be seen: {where}\nDrag the time line to any moment of the run. Ctrl-C ends.", file=sys.stderr)
+        print(f"Watch again: {where}\nDrag the time line to any moment of the run. Ctrl-C ends.", file=sys.stderr)
         while not self._processes.children["sim"].left:
             event = bus.receive(timeout=0.1)
             if event is not None and event.topic == "stop":
@@ -155,10 +155,10 @@ class Run:
 
 
 def _paused(bus: Bus, status: Status) -> Status:
-    """The status of a run that is paused for its end, when the driver has answered its last tick."""
+    """Pause the run, wait until the driver has answered its last tick, and return the status."""
     reply, deadline = bus.control(Control(verb="pause"), ANSWERED_WITHIN_S), time.monotonic() + ANSWERED_WITHIN_S
     while reply is not None:
-        status = reply.status  # asked for: those in the inbox may be older than the pause
+        status = reply.status  # requested, because a status in the inbox may be older than the pause
         if status.phase != "paused" or not status.waiting_for or time.monotonic() > deadline:
             break
         bus.receive(timeout=0.05)
@@ -167,7 +167,7 @@ def _paused(bus: Bus, status: Status) -> Status:
 
 
 def _last(bus: Bus, status: Status) -> Status:
-    """The last status of a simulation that has ended by request."""
+    """Return the last status of a simulation that has ended on request."""
     while (event := bus.receive(timeout=0.2)) is not None:
         status = event.message if event.topic == "status" else status
     return status

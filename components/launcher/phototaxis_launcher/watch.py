@@ -1,4 +1,4 @@
-"""Watches the processes of a run: restarts those that die, and goes on without those that a run can do without."""
+"""Supervises the processes of a run: restarts those that die, and goes on without those that are not needed."""
 
 from phototaxis.runtime.errors import UserError, warn
 from phototaxis.wire.messages import Status
@@ -10,7 +10,7 @@ from phototaxis_launcher.requests import SwapRequests
 
 
 class Watch:
-    """Looks after the children of a launcher."""
+    """Supervises the child processes of a launcher."""
 
     def __init__(self, processes: Processes, requests: SwapRequests, progress: Progress, folder: RunFolder):
         self._processes, self._requests, self._progress = processes, requests, progress
@@ -18,12 +18,12 @@ class Watch:
         self._drove: set[str] = set()
 
     def look(self) -> None:
-        """Pass on warnings, and restart what has died.
+        """Pass on warnings, and restart processes that have died.
 
         Raises
         ------
         UserError
-            with the line by which a component says why it ends, or when it keeps dying.
+            when a component explained why it ended, or keeps dying.
         """
         for child in self._processes.all():
             for line in child.warnings():
@@ -39,7 +39,7 @@ class Watch:
                     raise
 
     def miss(self, status: Status) -> None:
-        """Bring back an agent that ended without a word, though nobody has taken the seat over from it."""
+        """Restart an agent that ended without an error though nobody has taken over the seat from it."""
         self._drove |= {one.driver for one in status.drivers}
         last = status.drivers[-1].driver if status.drivers else ""
         for agent in self._processes.agents:

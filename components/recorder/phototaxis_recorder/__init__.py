@@ -1,1 +1,1 @@
-"""What happened, in Rerun: live and on disk."""
+"""Records runs with Rerun: as a live view and as files."""

@@ -1,4 +1,4 @@
-"""`phototaxis recorder`: the recorder as a process."""
+"""`phototaxis recorder`: runs the recorder as a process."""
 
 import os
 import sys
@@ -23,9 +23,9 @@ class Options(ComponentOptions, kw_only=True):
     """Options of the recorder."""
 
     output: str = "recording.rrd"
-    """file to record into, or a folder for RUN.rrd; where it stands already, the new one gets a number"""
+    """file to record into, or a folder for RUN.rrd; if the file exists, the new one gets a number"""
     bind: str = "127.0.0.1"
-    """address that the viewer's ports listen on; with --insecure one that others reach"""
+    """address that the viewer's ports listen on; an address that other machines reach needs --insecure"""
     grpc_port: Annotated[int, Meta(ge=0, le=65535)] = 9876
     """port of the live Rerun server; 0: any free one"""
     web_port: Annotated[int, Meta(ge=-1, le=65535)] = 9090
@@ -33,17 +33,17 @@ class Options(ComponentOptions, kw_only=True):
     memory: Annotated[str, Meta(pattern=r"^[0-9]+(MB|GB|MiB|GiB)$", description="a size in MB, GB, MiB or GiB")] = (
         "256MiB"
     )
-    """memory for viewers that come late, such as 256MiB"""
+    """memory in which the live server keeps data for viewers that connect late, such as 256MiB"""
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     options = parse(Options, argv, "phototaxis recorder", "Record the run on the bus, live and on disk.")
     if not options.insecure and not exposure.is_loopback(options.bind):
         raise UserError(
-            f"--bind {options.bind}: others could watch, and nothing guards that; use 127.0.0.1, or add --insecure"
+            f"--bind {options.bind}: others could watch, since nothing guards the viewer; use 127.0.0.1 or --insecure"
         )
     silence_rerun()
-    os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")  # its files get their footer later
+    os.environ.setdefault("RUST_LOG", "warn,re_log_encoding::rrd::file_sink=error")  # it warns that footers are missing
     from phototaxis_recorder.server import serve
     from phototaxis_recorder.sinks import RecordingSinks
 

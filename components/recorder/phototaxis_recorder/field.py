@@ -1,4 +1,4 @@
-"""How light it is where: the arena's light on a grid, with the shadows of walls and obstacles, for the eye."""
+"""The light intensity on a grid over the arena, with the shadows of walls and obstacles, as a background picture."""
 
 import numpy as np
 from phototaxis.geometry.arena import Arena
@@ -6,15 +6,15 @@ from phototaxis.geometry.arena import Arena
 CELLS_A_SIDE = 120
 """Cells along the longer side of the room."""
 DISC_CORNERS = 24
-"""Of the polygon that stands for a disc."""
+"""Corners of the polygon that stands for a disc."""
 MAX_CELLS_TIMES_EDGES = 20_000_000
-"""Cells × edges beyond which shadows are left out: they would take longer than a second."""
+"""Cells × edges above which the picture has no shadows, because they would take more than a second."""
 
 
 def light_field(arena: Arena) -> np.ndarray:
-    """Light intensity 0..1 at the middle of each cell, shape (rows, columns); row 0 is at y = 0.
+    """Return the light intensity, 0..1, at the middle of each cell, shape (rows, columns); row 0 is at y = 0.
 
-    As a light sensor without noise and body would read it (inverse square or linear law).
+    It is what a light sensor without noise reads when the robot's body hides nothing (inverse square or linear law).
     """
     width, height = arena.size
     cell = max(width, height) / CELLS_A_SIDE
@@ -37,7 +37,7 @@ def light_field(arena: Arena) -> np.ndarray:
 
 
 def _edges(arena: Arena) -> np.ndarray:
-    """Everything opaque as line segments, shape (edges, 2, 2)."""
+    """Return everything opaque as line segments, shape (edges, 2, 2)."""
     found = [(wall.start, wall.end) for wall in arena.walls]
     for polygon in arena.polygons:
         found += zip(polygon.corners, [*polygon.corners[1:], polygon.corners[0]], strict=True)
@@ -50,7 +50,7 @@ def _edges(arena: Arena) -> np.ndarray:
 
 
 def _sees(source: np.ndarray, places: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Whether no edge crosses the line from the source to each place, shape (places,)."""
+    """For each place, return whether no edge crosses the line from the source to it; shape (places,)."""
     clear = np.ones(len(places), dtype=bool)
     ray = places - source
     for start, end in edges:

@@ -1,7 +1,7 @@
-"""The file of a recording: what Rerun writes comes through a pipe, so that a full disk is ours to notice.
+"""The file of a recording: Rerun writes into a pipe, and we write the file, so that we notice a full disk.
 
-Rerun's own writer says nothing when it fails, and waits for ever if it fails while it is flushed. What it writes
-into the pipe always goes somewhere: into the file, or nowhere once the file has failed.
+Rerun's own file writer reports no errors, and a flush never returns after one. The pipe is always read: its bytes go
+into the file, or are dropped once writing the file has failed.
 """
 
 import array
@@ -22,22 +22,22 @@ PAUSE_S = 0.001
 
 
 class RecordingFile:
-    """A file that is written by a thread of its own.
+    """Writes everything that comes through a pipe into a file, in a thread of its own.
 
     Parameters
     ----------
-    wanted : its path; where a file stands already, the new one gets a number.
+    wanted : path of the file; if a file exists there, the new one gets a number.
 
     Attributes
     ----------
-    path : the path that it got.
-    sink : the path of the pipe, for Rerun to open and write.
-    error : why the file is written no more; None while it is.
+    path : path of the file that is written.
+    sink : path of the pipe, for Rerun to open and write.
+    error : the error that has ended the writing; None while all is well.
 
     Raises
     ------
     OSError
-        when it cannot be made.
+        when the file cannot be made.
     """
 
     def __init__(self, wanted: Path):
@@ -51,12 +51,12 @@ class RecordingFile:
         self._thread.start()
 
     def settle(self) -> int:
-        """Wait until everything that was put into the pipe is written; the size of the file.
+        """Wait until everything in the pipe is written, and return the size of the file.
 
         Raises
         ------
         OSError
-            when the file is written no more.
+            when the writing has ended with an error.
         """
         while self._waiting():
             time.sleep(PAUSE_S)
@@ -65,27 +65,27 @@ class RecordingFile:
         return self.path.stat().st_size
 
     def cut(self, size: int) -> None:
-        """Leave the first `size` bytes of the file; with 0 no file. It is written no more."""
+        """Stop writing, and keep only the first `size` bytes of the file; with 0, remove it."""
         with self._lock, suppress(OSError):
             self.error = self.error or OSError("cut short")
             os.truncate(self.path, size) if size else self.path.unlink()
 
     def close(self) -> None:
-        """After Rerun has closed its end."""
+        """Close the file and the pipe; call it after Rerun has closed its end."""
         os.close(self._write)
         self._thread.join()
         os.close(self._read)
         os.close(self._file)
 
     def _waiting(self) -> int:
-        """Bytes in the pipe; 0 when the last of them are written, too."""
+        """Return the number of bytes in the pipe; 0 means that the last of them are in the file too."""
         found = array.array("i", [0])
         with self._lock:
             fcntl.ioctl(self._read, termios.FIONREAD, found)
         return found[0]
 
     def _copy(self) -> None:
-        """Copy until the pipe is closed: between reading and writing nobody else has the lock."""
+        """Copy until the pipe is closed; the lock makes reading and writing one step for the other thread."""
         while True:
             select.select([self._read], [], [])
             with self._lock:
@@ -100,7 +100,7 @@ class RecordingFile:
 
 
 def fresh_file(wanted: Path) -> Path:
-    """Make `wanted`, or the same with -2, -3, … where a file stands already: no recording is overwritten."""
+    """Create the file `wanted`, or if it exists, one with -2, -3, … in its name; no recording is overwritten."""
     for number in count(1):
         file = wanted if number == 1 else wanted.with_name(f"{wanted.stem}-{number}{wanted.suffix}")
         with suppress(FileExistsError):

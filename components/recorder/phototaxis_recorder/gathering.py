@@ -1,4 +1,4 @@
-"""What the recorder decides: which run to record, when to ask for what is missing, and when all is there."""
+"""The decisions of the recorder: which run to record, when to ask for missing chunks, and when all are there."""
 
 import math
 from collections.abc import Iterator
@@ -14,13 +14,13 @@ from phototaxis.wire.topics import TOPICS
 from phototaxis_recorder.reader import LogReader
 
 KEEP_EVERY_S = 0.15
-"""What was gathered is written to disk so often."""
+"""Seconds between two writes of the gathered chunks to disk."""
 ASK_EVERY_S = 1.0
-"""Seconds after which a silent topic, or one that lags, is asked for what was missed."""
+"""Seconds after which the recorder asks the writers of a silent or late topic for missed chunks."""
 BEHIND_TICKS = 64
-"""A topic so far behind the newest tick is asked for its chunks, and not waited for.
+"""If a topic is more ticks than this behind the newest, the recorder asks for its chunks and no longer waits for it.
 
-Zenoh may drop them for long once a link was congested."""
+Zenoh may drop chunks for a long time after a link was congested."""
 LOGS = tuple(topic.name for topic in TOPICS.values() if topic.kind == "log")
 
 
@@ -37,11 +37,11 @@ class Note(Own):
 
 
 class Keep(Own):
-    """Bring to disk what was written."""
+    """Flush the recording to disk."""
 
 
 class Report(Own):
-    """Publish how far the recording is on disk."""
+    """Publish the newest tick that is on disk."""
 
 
 class Close(Own):
@@ -53,19 +53,19 @@ class Phase(StrEnum):
 
     IDLE = "idle"
     JOINING = "joining"
-    """It has asked for the world, and goes on recording the run that it records, if any."""
+    """The recorder has asked for the world; meanwhile it goes on recording the present run, if there is one."""
     RECORDING = "recording"
     COMPLETING = "completing"
-    """It knows the world of another run, and has asked everybody for what is left of the present one."""
+    """The recorder knows the world of another run, and has asked all writers for the rest of the present one."""
     JOINING_TO_END = "joining to end"
-    """It is to stop, and waits for the world that it has asked for."""
+    """The recorder must stop, but still waits for the world that it has asked for."""
     ENDING = "ending"
-    """It is to stop, and has asked everybody for what is left."""
+    """The recorder must stop, and has asked all writers for the rest of the run."""
     ENDED = "ended"
 
 
 class Input(StrEnum):
-    """What may happen to it."""
+    """What may happen to the recorder."""
 
     NEWS = "simulation or another run's chunk"
     WORLD = "world"
@@ -103,7 +103,7 @@ TABLE = {
 
 
 class Gathering:
-    """Gathers the logs of whatever run is on the bus into recordings, one for each run."""
+    """Gathers the logs of the runs on the bus into recordings, one for each run."""
 
     def __init__(self) -> None:
         self._phase = Transitions(TABLE, Phase.IDLE)
@@ -119,13 +119,13 @@ class Gathering:
 
     @property
     def deadline(self) -> float:
-        """When something is to be kept on disk or asked for."""
+        """The time of the next flush to disk or the next question, in the clock of `now`."""
         if self._run:
             return min(self._keep_at, self._ask_at)
         return self._ask_at if self._simulations and self._phase.state is Phase.IDLE else math.inf
 
     def on(self, event: Event, now: float) -> list[Effect]:
-        """What follows from an event."""
+        """Handle an event, and return what the recorder does about it."""
         before = self._phase.state
         effects = [*self._take(event, now), *self._due(now)]
         after = self._phase.state
@@ -138,7 +138,7 @@ class Gathering:
             if self._run and event.message.run == self._run:
                 yield from self._readers[event.topic].came(event.message, now)
             else:
-                yield from self._news()  # its chunks are asked for when its recording has begun
+                yield from self._news()  # the recorder asks for this chunk again when that run's recording begins
         elif event.topic in ("alive", "gone"):
             yield from self._noticed(event.topic == "alive", *event.message)
         elif event.topic == "answer":
@@ -147,7 +147,7 @@ class Gathering:
             self._phase.take(Input.STOP)
 
     def _noticed(self, here: bool, role: str, ident: str) -> Iterator[Effect]:
-        """Somebody came or went: a simulation may have brought a run."""
+        """Note that a component came or went; a simulation that comes may bring another run."""
         for known in (self._alive, self._simulations) if role == "sim" else (self._alive,):
             (known.add if here else known.discard)(ident)
         if self._run and role in ROLES and role != "observer":
@@ -156,7 +156,7 @@ class Gathering:
             yield from self._news()
 
     def _news(self) -> Iterator[Effect]:
-        """There may be another run."""
+        """Ask for the world, since there may be another run."""
         if self._phase.state in (Phase.IDLE, Phase.RECORDING):
             yield Ask("world", "world")
         self._phase.take(Input.NEWS)
@@ -171,7 +171,7 @@ class Gathering:
                 yield from reader.answered(answer.tag, answer.messages)
 
     def _join(self, world: World | None, now: float) -> Iterator[Effect]:
-        """Record the run of a world, if it is another one."""
+        """Record the run of a world, unless it is the one that is recorded already."""
         if world is None or world.run == self._run:
             self._ask_at = self._ask_at if self._run else now + ASK_EVERY_S
             self._phase.take(Input.NO_OTHER if self._run else Input.NO_WORLD)
@@ -183,13 +183,13 @@ class Gathering:
             yield self._open(world, now)
 
     def _open(self, world: World, now: float) -> Open:
-        """Begin with a run; everybody is asked at once for all there is."""
+        """Begin the recording of a run; `_ask_at` is now, so that all writers are asked at once for their chunks."""
         self._run, self._keep_at, self._ask_at = world.run, now + KEEP_EVERY_S, now
         self._readers = {topic: LogReader(topic, world.run, self._tags, self._alive) for topic in LOGS}
         return Open(world=world)
 
     def _due(self, now: float) -> Iterator[Effect]:
-        """What is done at intervals."""
+        """Do what is done at intervals: flush, report, and ask for missing chunks."""
         if self._run and now >= self._keep_at:
             self._keep_at = now + KEEP_EVERY_S
             yield Keep()
@@ -209,7 +209,7 @@ class Gathering:
                 yield from reader.ask()
 
     def _complete(self, now: float, begin: bool) -> Iterator[Effect]:
-        """Ask everybody for what is left; when all answers are there, go to the next run or stop."""
+        """Ask all writers for the rest of the run; when all answers are there, go to the next run or stop."""
         for reader in self._readers.values() if begin else ():
             yield from reader.ask()
         if any(reader.open for reader in self._readers.values()):

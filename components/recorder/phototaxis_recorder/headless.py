@@ -1,4 +1,4 @@
-"""A Rerun viewer without a display: what it shows, as pictures and as its own words."""
+"""Runs a Rerun viewer without a display, to save what it shows as pictures and to read its state."""
 
 import subprocess
 import tempfile
@@ -24,12 +24,12 @@ ANIMATION_WIDTH_PIXELS = 900
 
 @contextmanager
 def viewer(source: str) -> Iterator[Any]:
-    """A viewer of a file or of a `rerun+http://` address, as Rerun's ViewerClient.
+    """Run a viewer of a file or of a `rerun+http://` address; gives Rerun's ViewerClient.
 
     Raises
     ------
     ComponentFailed
-        when it does not come up (it needs a Vulkan driver; Mesa's for software rendering will do).
+        when the viewer does not start; it needs a Vulkan driver, and Mesa's software renderer is enough.
     """
     port = str(*free_ports(1))
     what = ["--connect", source] if source.startswith("rerun+") else [source]
@@ -51,17 +51,17 @@ def _connected(process: subprocess.Popen[bytes], port: str, said: Any) -> Any:
             client.get_state()
             return client
         except Exception:
-            time.sleep(0.1)  # a program that does not say when it can be asked
+            time.sleep(0.1)  # the program does not say when it is ready
     said.seek(0)
     lines = said.read().decode(errors="replace").strip().splitlines()
     raise ComponentFailed(
         "the Rerun viewer does not start without a display; it needs a Vulkan driver "
-        f"(Debian: mesa-vulkan-drivers). Its last words: {lines[-1] if lines else 'none'}"
+        f"(Debian: mesa-vulkan-drivers). Its last output: {lines[-1] if lines else 'none'}"
     )
 
 
 def shown_tick(client: Any) -> int:
-    """The tick that the viewer shows now, by its own state; −1 while it shows none."""
+    """Return the tick that the viewer shows now; −1 while it shows none."""
     state = client.get_state()
     for recording in state.recordings:
         if recording.store_id == state.active_recording and recording.current_timeline == "tick":
@@ -70,9 +70,9 @@ def shown_tick(client: Any) -> int:
 
 
 def picture(source: str, target: Path, seconds: float) -> None:
-    """Write what the viewer shows: a .png after `seconds`, or those seconds that follow as a .gif."""
+    """Write what the viewer shows: a .png after `seconds`, or a .gif of the `seconds` that follow those."""
     with viewer(source) as client, tempfile.TemporaryDirectory() as folder:
-        time.sleep(seconds)  # the moment that is wanted
+        time.sleep(seconds)  # the user chooses the moment
         if target.suffix == ".png":
             file = Path(folder) / "picture.png"
             client.save_screenshot(str(file))

@@ -1,4 +1,4 @@
-"""The layout of the viewer: the whole story at first sight; and what does not change in it."""
+"""The layout of the viewer, and everything in the picture that does not change during a run."""
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -9,17 +9,17 @@ from phototaxis_recorder.field import light_field
 from phototaxis_recorder.policy_map import HEIGHT, WIDTH, frame
 
 TRAIL_TICKS = 300
-"""Ticks of trail that are shown behind the robot."""
+"""Length of the trail behind the robot, ticks."""
 PLOT_TICKS = 600
-"""Ticks that the fast plots look back."""
+"""Ticks that the plots of reward and light show."""
 PAPER_SUCCESS_RATE = 0.8
-"""What the paper reports for its Q-table with the simple percept: "upwards of 80%"."""
+"""The success rate that the paper reports for its Q-table with the simple percept: "upwards of 80%" (section 6.2)."""
 MEAN_TICKS = 100
-"""Ticks over which the mean reward is taken."""
+"""Ticks over which the mean reward is averaged."""
 
 
 def blueprint(arena: Arena, epochs: int) -> rrb.Blueprint:
-    """Arena and events on the left; success, reward, light; on the right what was learned."""
+    """Lay out the viewer: arena and events on the left, plots in the middle, what was learned on the right."""
     width, height = arena.size
     edge = 0.04 * max(width, height)
 
@@ -82,7 +82,7 @@ def blueprint(arena: Arena, epochs: int) -> rrb.Blueprint:
 
 
 def draw_world(recording: rr.RecordingStream, arena: Arena) -> None:
-    """Floor with light, walls, obstacles, lights, the robot's body. Views are y-down: y is mirrored."""
+    """Draw the floor, walls, obstacles, lights and the robot's body. Rerun's views are y-down, so y is mirrored."""
 
     def log(path: str, *what: rr.AsComponents) -> None:
         rr.log(path, *what, static=True, recording=recording)

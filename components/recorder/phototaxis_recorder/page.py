@@ -1,4 +1,4 @@
-"""The page that shows the live view in a browser, and keeps the browser from contacting others."""
+"""Serves Rerun's web viewer, and keeps the browser from contacting other servers."""
 
 import re
 import socketserver
@@ -15,17 +15,17 @@ from phototaxis.runtime.ports import free_ports
 from phototaxis_recorder.viewer import STARTS_WITHIN_S, rerun_program
 
 VIEWER_PATHS = ("/", "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/apple-touch-icon.png")
-"""Everything that the web viewer is made of."""
+"""All files of the web viewer."""
 EXTERNAL_LINK = re.compile(rb"""<link[^>]*href="https://[^>]*>""")
-"""Hints in the page to connect to others, which a content security policy does not cover."""
+"""Hints in the page that make a browser connect to other servers; a content security policy does not cover them."""
 
 
 class ViewerPage(socketserver.ThreadingTCPServer):
-    """Rerun's web viewer, served by threads of this process on one address.
+    """Serves Rerun's web viewer on one address, from threads of this process.
 
-    Left alone it would fetch fonts, report its use and look for updates. The browser is told (by a content security
-    policy) to connect to nothing but this page and recordings on `grpc_port`. The files come from Rerun's own
-    program when the first browser asks for them.
+    By default the viewer fetches fonts, reports its use and looks for updates. A content security policy makes the
+    browser connect only to this page and to recordings on `grpc_port`. The files come from Rerun's own program when
+    the first browser asks for them.
     """
 
     allow_reuse_address = daemon_threads = True
@@ -41,13 +41,13 @@ class ViewerPage(socketserver.ThreadingTCPServer):
         Thread(target=self.serve_forever, daemon=True).start()
 
     def file(self, path: str) -> tuple[str, bytes] | None:
-        """Type and content of one of the viewer's files."""
+        """Return type and content of one of the viewer's files, or None if it has no such file."""
         with self._lock:
             self._files = self._files or _viewer_files()
         return self._files.get(path)
 
     def close(self) -> None:
-        """Serve no more; the port is free then."""
+        """Stop serving, and free the port."""
         self.shutdown()
         self.server_close()
 
@@ -72,17 +72,17 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             self.wfile.write(content)
         except ConnectionError:
-            self.close_connection = True  # the browser has gone elsewhere
+            self.close_connection = True  # the browser has closed the page
 
     def log_message(self, format: str, *args: object) -> None:
-        """Requests are no news."""
+        """Print nothing for a request; the base class would print a line."""
 
 
 def _viewer_files() -> dict[str, tuple[str, bytes]]:
-    """The web viewer's files as Rerun's own program hands them out.
+    """Fetch the web viewer's files from Rerun's own program.
 
-    A shell holds the program by its standard input, and in a session of its own: it ends with this process,
-    however that ends, and Ctrl-C does not part the two.
+    A shell runs the program until its standard input closes, so that the program ends even when this process is
+    killed. A session of their own keeps Ctrl-C from reaching either.
     """
     page, grpc = free_ports(2)
     program = [
@@ -112,7 +112,7 @@ def _viewer_files() -> dict[str, tuple[str, bytes]]:
 
 
 def _fetch(port: int, path: str) -> tuple[str, bytes]:
-    """Type and content of a file, from a program that may still be starting."""
+    """Return type and content of a file; the program that serves it may still be starting."""
     deadline = time.monotonic() + STARTS_WITHIN_S
     while True:
         connection = HTTPConnection("127.0.0.1", port, timeout=STARTS_WITHIN_S)
@@ -122,7 +122,7 @@ def _fetch(port: int, path: str) -> tuple[str, bytes]:
             return answer.headers["Content-Type"], answer.read()
         except OSError as error:
             if time.monotonic() > deadline:
-                raise ComponentFailed(f"Rerun's program does not hand out its web viewer: {error}") from None
+                raise ComponentFailed(f"Rerun's program does not serve its web viewer: {error}") from None
             time.sleep(0.05)
         finally:
             connection.close()

@@ -1,4 +1,4 @@
-"""What was learned, drawn: for each state an arrow to where its best action drives the robot."""
+"""Draws the learned policy: for each percept state an arrow in the direction of the best action."""
 
 import math
 
@@ -10,11 +10,11 @@ from phototaxis_recorder.colors import BLUE, packed
 
 UNVISITED, PRESENT = (190, 190, 190, 255), (255, 214, 130, 255)
 WIDTH, HEIGHT = 3.0, 2.0
-"""The picture, whatever the number of states."""
+"""Size of the picture, for any number of states."""
 
 
 def grid(sizes: tuple[int, ...]) -> tuple[int, int]:
-    """Columns and rows for the states: the first variables across, the others down, in about the picture's shape."""
+    """Return columns and rows of the states, in about the picture's shape: the first variables span the columns."""
     states = math.prod(sizes)
     wanted = math.sqrt(states * WIDTH / HEIGHT)
     across = min(np.cumprod(sizes).tolist(), key=lambda first: abs(math.log(first / wanted)))
@@ -22,26 +22,26 @@ def grid(sizes: tuple[int, ...]) -> tuple[int, int]:
 
 
 def cells(sizes: tuple[int, ...]) -> np.ndarray:
-    """The middle of each state's cell, (states, 2)."""
+    """Return the middle of each state's cell, shape (states, 2)."""
     across, down = grid(sizes)
     number = np.arange(across * down)
     return np.stack([(number // down + 0.5) * WIDTH / across, (number % down + 0.5) * HEIGHT / down], axis=1)
 
 
 def reach(sizes: tuple[int, ...]) -> float:
-    """Half of what fits into a cell."""
+    """Return half the side of the largest square that fits into a cell."""
     across, down = grid(sizes)
     return min(WIDTH / across, HEIGHT / down) / 2
 
 
 def frame() -> rr.LineStrips2D:
-    """A border around all states."""
+    """Return a border around all states."""
     corners = [(0, 0), (WIDTH, 0), (WIDTH, HEIGHT), (0, HEIGHT), (0, 0)]
     return rr.LineStrips2D([corners], colors=UNVISITED, radii=0.005)
 
 
 def heading(action: int) -> tuple[float, float]:
-    """A motor command as an arrow, y down: forward is up, a turn to the left points left; (0, 0) stands still."""
+    """Return an action as an arrow, y down: forward points up, a left turn points left, (0, 0) is standing still."""
     left, right = ACTIONS[action]
     return (left - right) / 2, -(left + right) / 2
 
@@ -50,14 +50,14 @@ HEADINGS = np.array([heading(action) for action in range(len(ACTIONS))])
 
 
 def arrows(percept: Percept, table: np.ndarray, visits: np.ndarray) -> tuple[rr.Arrows2D, rr.Points2D]:
-    """The greedy action of every state as an arrow, or as a dot where it is to stand still.
+    """Return the greedy action of each visited state in blue: an arrow, or a dot for standing still.
 
-    Blue where the state was met; a small grey dot where it never was.
+    A state that was never visited gets a small grey dot.
 
     Parameters
     ----------
-    table : Q, shape (states, 9).
-    visits : shape (states,).
+    table : Q values, shape (states, 9).
+    visits : number of visits of each state, shape (states,).
     """
     allowed, met = np.array(percept.actions), visits > 0
     places, half = cells(percept.sizes), reach(percept.sizes)
@@ -72,6 +72,6 @@ def arrows(percept: Percept, table: np.ndarray, visits: np.ndarray) -> tuple[rr.
 
 
 def present(percept: Percept, state: int) -> rr.Points2D:
-    """The state in which the robot is."""
+    """Mark the state in which the robot is now."""
     place = cells(percept.sizes)[state : state + 1]
     return rr.Points2D(place, colors=PRESENT, radii=0.95 * reach(percept.sizes), draw_order=-1)

@@ -1,7 +1,7 @@
-"""The chunks of one log topic in their order, and the questions for those that are missing.
+"""Puts the chunks of one log topic in order, and asks for those that are missing.
 
-Logs are dropped under pressure, and recorders come late or are restarted; so each chunk has a number, and who wrote
-it keeps it for a while and is asked for it again.
+Chunks may be dropped under load, and a recorder may start late or restart. So each chunk has a number, and its writer
+keeps it for a while, so that the recorder can ask for it again.
 """
 
 import math
@@ -20,12 +20,12 @@ class Write(Own):
 
 
 class LogReader:
-    """One log topic in one run: its chunks come in order, those that follow a gap wait until it has been asked for.
+    """Reads one log topic of one run. Chunks that follow a gap wait until the question for the gap is answered.
 
     Attributes
     ----------
     newest : the newest tick that was written; −1 for none.
-    heard : when the newest chunk was published.
+    heard : the time at which the newest chunk came.
     open : the tags of the questions that are not answered yet.
     """
 
@@ -33,24 +33,24 @@ class LogReader:
         self.topic, self.newest, self.heard, self.open = topic, -1, -math.inf, set[str]()
         self._run, self._tags, self._alive = run, tags, alive
         self._writer = ""
-        """Who wrote the newest chunk."""
+        """The writer of the newest chunk."""
         self._expected: dict[str, int] = {}
         """The number of the next chunk of each writer."""
         self._held: list[Any] = []
         """Chunks that came while a question was open."""
         self._asked: set[str] = set()
-        """Who is asked in the open questions; "" for everybody."""
+        """The writers that the open questions ask; "" stands for all writers."""
         self._found: list[Any] = []
-        """What was answered to questions while others were open."""
+        """Chunks from the answers that came while other questions were open."""
 
     def came(self, chunk: Any, now: float) -> Iterator[Effect]:
-        """A chunk was published."""
+        """Take a chunk that was published."""
         self.heard = now
         self._held.append(chunk)
         yield from self._go_on()
 
     def answered(self, tag: str, chunks: Iterable[Any]) -> Iterator[Effect]:
-        """A question was answered; when all are, chunks that have not come are lost."""
+        """Take the answer to a question; after the last open one, a chunk that is still missing counts as lost."""
         self.open.remove(tag)
         self._found += chunks
         if self.open:
@@ -59,22 +59,22 @@ class LogReader:
         for chunk in sorted(found, key=lambda chunk: chunk.tick[0]):
             yield from self._write(chunk)
         if self._held:
-            self._writer = self._held[0].writer  # its predecessor has been asked
+            self._writer = self._held[0].writer  # the writer before this one has been asked already
             if asked & {"", self._writer}:
                 yield from self._write(self._held.pop(0))
         yield from self._go_on()
 
     def ask(self) -> Iterator[Effect]:
-        """Ask the newest writer (everybody, if none is known) for what is missing."""
+        """Ask the newest writer for missing chunks, or all writers if none is known."""
         yield from self._ask(self._writer)
 
     def _go_on(self) -> Iterator[Effect]:
-        """Write the chunks that wait, until one is missing."""
+        """Write the chunks that wait, up to the next gap."""
         while self._held and not self.open:
             chunk, former = self._held[0], self._writer
             self._writer = chunk.writer
             if former not in ("", chunk.writer):
-                yield from self._ask(former)  # what it still has comes before
+                yield from self._ask(former)  # chunks of the former writer precede this one
             if not self.open and chunk.seq > self._expected.get(chunk.writer, 0):
                 yield from self._ask(chunk.writer)
             if not self.open:
@@ -89,7 +89,7 @@ class LogReader:
         yield Ask(tag, self.topic, LogRequest(seq=self._expected.get(writer, 0), writer=writer), every=True)
 
     def _write(self, chunk: Any) -> Iterator[Effect]:
-        """A chunk of this run; not one that was written before."""
+        """Write a chunk, unless it is of another run or was written before."""
         if chunk.run != self._run or chunk.seq < self._expected.get(chunk.writer, 0):
             return
         self._writer, self._expected[chunk.writer] = chunk.writer, chunk.seq + 1

@@ -1,4 +1,4 @@
-"""`phototaxis recordings`: what there is to look at, and the removal of what is old or too much."""
+"""`phototaxis recordings`: lists recordings, and removes those that are old or exceed a total size."""
 
 import sys
 import time
@@ -16,7 +16,7 @@ from phototaxis_recorder.summary import RecordingFile, recordings, summary_file
 
 DAY_S, MEGABYTE_BYTES = 86_400, 1_000_000
 BUSY_S = 60.0
-"""A recording written to within this many seconds is not removed."""
+"""A recording that was written to within this many seconds is in use, and is not removed."""
 
 
 class Options(msgspec.Struct, kw_only=True):
@@ -27,15 +27,15 @@ class Options(msgspec.Struct, kw_only=True):
     max_age: Annotated[float, Meta(ge=0, examples=[30])] | None = None
     """remove recordings older than this many days"""
     max_size: Annotated[float, Meta(ge=0, examples=[1000])] | None = None
-    """keep the newest recordings up to this many megabytes together, remove the others"""
+    """keep the newest recordings, up to this many megabytes in total, and remove the others"""
     dry_run: bool = False
-    """only say what would be removed"""
+    """only print what would be removed"""
     json: bool = False
     """print one JSON object for each recording"""
 
 
 def main(argv: Sequence[str]) -> int:
-    about = "List the recordings, newest first; with --max-age or --max-size remove what exceeds them."
+    about = "List the recordings, newest first; with --max-age or --max-size remove those that exceed the limit."
     options = parse(Options, argv, "phototaxis recordings", about)
     folder = Path(options.out)
     if not folder.is_dir():
@@ -64,7 +64,10 @@ def main(argv: Sequence[str]) -> int:
 def excess(
     found: list[RecordingFile], now: float, max_age: float | None, max_size: float | None
 ) -> list[RecordingFile]:
-    """Those of the recordings (newest first) that exceed an age in days or a total size in MB; none in use."""
+    """Return the recordings to remove: those above an age in days or a total size in MB that are not in use.
+
+    `found` has the newest first; `now` is in seconds since 1970.
+    """
     doomed, total = [], 0
     for recording in found:
         total += recording.size
@@ -76,13 +79,13 @@ def excess(
 
 
 def as_object(recording: RecordingFile) -> dict[str, object]:
-    """A recording for --json."""
+    """Return a recording as the object that --json prints."""
     summary = msgspec.to_builtins(recording.summary) if recording.summary else {}
     return {"file": str(recording.file), "bytes": recording.size, "written": recording.written, **summary}
 
 
 def table(found: list[RecordingFile]) -> list[str]:
-    """The recordings as aligned lines."""
+    """Return the recordings as lines with aligned columns."""
     rows: list[tuple[str, ...]] = [("recording", "run", "arena", "drivers", "epochs", "success", "MB")]
     worlds = {(one.summary.arena, one.summary.arena_digest) for one in found if one.summary is not None}
     names = Counter(name for name, _ in worlds)

@@ -1,4 +1,4 @@
-"""The recorder on the bus: the machine, the loop that runs it, and what writes the recordings."""
+"""Runs the recorder on the bus: `Gathering` decides, `Desk` writes the recordings."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ from phototaxis_recorder.sinks import RecordingSinks
 
 
 def serve(bus: Bus, start: Callable[[World], RecordingSinks]) -> None:
-    """Record whatever run is on the bus until a "stop" event; then take what is still to be had.
+    """Record the runs on the bus until a "stop" event; then gather the chunks that are still missing, and end.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def serve(bus: Bus, start: Callable[[World], RecordingSinks]) -> None:
     Raises
     ------
     Unavailable
-        when not all of a recording could be written.
+        when a recording could not be written completely.
     """
     desk = Desk(bus, start)
     try:
@@ -35,11 +35,11 @@ def serve(bus: Bus, start: Callable[[World], RecordingSinks]) -> None:
 
 
 class Desk:
-    """Carries out what `Gathering` wants written; between `Open` and `Close` there is a recording.
+    """Carries out the effects of `Gathering`; between `Open` and `Close` there is a recording.
 
     Attributes
     ----------
-    faults : why recordings that are closed are not complete, a line for each.
+    faults : for each closed recording that is not complete, a line that says why.
     """
 
     def __init__(self, bus: Bus, start: Callable[[World], RecordingSinks]):
@@ -49,7 +49,7 @@ class Desk:
         self.faults: list[str] = []
 
     def carry(self, effect: Own) -> None:
-        """Do one thing."""
+        """Carry out one effect."""
         if isinstance(effect, Open):
             self._run, self._recording = effect.world.run, self._start(effect.world)
         elif isinstance(effect, Close):
@@ -73,7 +73,7 @@ class Desk:
                 )
 
     def close(self) -> None:
-        """Write what waits and close the recording, if there is one."""
+        """Write the chunks that wait, and close the recording, if there is one."""
         recording, self._recording = self._recording, None
         if recording is None:
             return

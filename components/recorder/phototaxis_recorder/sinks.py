@@ -1,4 +1,4 @@
-"""Where a recording goes: a file, and the live gRPC server."""
+"""The two sinks of a recording: a file and the live gRPC server."""
 
 import os
 import shutil
@@ -17,25 +17,25 @@ from phototaxis_recorder.translate import Translator
 from phototaxis_recorder.viewer import rerun_program
 
 MAX_REWRITTEN_BYTES = 250_000_000
-"""Bytes above which a recording is not rewritten at its end: that takes more than twice as much memory."""
+"""A larger recording is not rewritten at its end, because that takes more than twice its size in memory."""
 MIN_FREE_BYTES = 200_000_000
-"""Bytes that are left on a disk below which a recording warns."""
+"""The recorder warns when the disk has less free space."""
 
 
 class RecordingSinks:
-    """The recording of one run: a live server, and a file whose summary says how far it goes.
+    """The recording of one run: a live server, and a file with a summary that says up to which tick it goes.
 
-    At the first failure the file is cut back to what the last summary tells, and is written no more; the live
-    view goes on. The file has no footer while it grows: Rerun would keep the footer's entries in memory, some
-    20 MB a minute at full speed.
+    When writing fails, the file is cut back to the tick of its last summary and writing stops; the live view goes on.
+    The file has no footer while it grows, because Rerun would keep the footer's entries in memory, some 20 MB a
+    minute at full speed.
 
     Attributes
     ----------
-    translator : takes what is to be recorded.
-    file : where it is recorded, or was to be.
-    fault : why the file is not written any more, or lacks its summary, in a line; "" while all is well.
-    low : that its disk is nearly full, in a line; "" while it is not.
-    kept : the newest tick that is in the file; −1 for none.
+    translator : converts log chunks, and writes them to both sinks.
+    file : path of the file, also when it could not be made.
+    fault : a line that says why writing has stopped or the summary is missing; "" while all is well.
+    low : a line that says that the disk is nearly full; "" while it is not.
+    kept : the newest tick in the file; −1 for none.
     """
 
     def __init__(self, world: World, wanted: Path, host: str, grpc_port: int, memory: str):
@@ -54,7 +54,7 @@ class RecordingSinks:
             self._tell(self.fault)
 
     def keep(self) -> None:
-        """Bring to disk what was logged, then the summary of it."""
+        """Write everything logged so far to disk, then its summary."""
         if self._out is None or self._stopped:
             return
         summary = self.translator.summary
@@ -69,14 +69,14 @@ class RecordingSinks:
             self._out.cut(self._size)
             told = f"recorded up to tick {self.kept}" if self.kept >= 0 else "nothing is recorded"
             self._fail(f"{write_failure(self.file, error) if isinstance(error, OSError) else error}; {told}")
-        except Unavailable as error:  # the recording itself is well
+        except Unavailable as error:  # only the summary could not be written
             self._fail(str(error))
         else:
             self.fault, self._size, self.kept = "", size, summary.tick
             self._mind_the_space()
 
     def close(self) -> None:
-        """Close the file, and add its footer where there is room."""
+        """Close the file, and add its footer if there is room on the disk."""
         self._stream.disconnect()
         if self._out is not None:
             self._out.close()
@@ -107,9 +107,9 @@ class RecordingSinks:
 
 
 def complete(file: Path) -> None:
-    """Give a closed recording its footer and larger chunks, so that it opens fast.
+    """Rewrite a closed recording with a footer and larger chunks, so that it opens fast.
 
-    A large one stays as it is, and so does one that would not fit a second time onto its disk.
+    A large recording stays as it is, and so does one of which a copy does not fit on the disk.
     """
     try:
         size, free = file.stat().st_size, shutil.disk_usage(file.parent).free

@@ -1,4 +1,4 @@
-"""What there is on disk: recordings, and the summary that the recorder keeps beside each."""
+"""The recordings on disk, and the summary that the recorder keeps beside each."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -9,18 +9,18 @@ from phototaxis.runtime.disk import write_atomic
 
 
 class Summary(msgspec.Struct):
-    """What a recording came to so far."""
+    """The outcome of a recorded run so far."""
 
     run: str
     arena: str
     arena_digest: str = ""
-    """`Arena.digest`: two worlds may have one name."""
+    """`Arena.digest`, because two different arenas may have the same name."""
     drivers: list[str] = []
-    """Who drove, in the order of their first tick."""
+    """The drivers, in the order of their first tick."""
     tick: int = -1
     """The newest tick."""
     epochs: int = 0
-    """Learning steps so far: ticks without the placements."""
+    """Learning steps so far: all ticks except the placements."""
     episodes: int = 0
     reached: int = 0
     recent: float = 0.0
@@ -32,31 +32,31 @@ class RecordingFile(NamedTuple):
 
     file: Path
     size: int
-    """Bytes."""
+    """Size in bytes."""
     written: float
-    """When it was written to last, s since 1970."""
+    """Time of the last write, s since 1970."""
     summary: Summary | None
-    """None where it has none that can be read."""
+    """None if there is no summary, or it cannot be read."""
 
 
 def summary_file(file: Path) -> Path:
-    """Where the summary of a recording stands."""
+    """Return the path of a recording's summary."""
     return file.with_suffix(".json")
 
 
 def write_summary(file: Path, summary: Summary) -> None:
-    """Put the summary beside its recording, whole or not at all; `Unavailable` when it cannot be written."""
+    """Write the summary beside its recording, atomically; `Unavailable` when it cannot be written."""
     write_atomic(summary_file(file), msgspec.json.encode(summary))
 
 
 def recordings(folder: Path) -> list[RecordingFile]:
-    """All recordings in a folder and the folders of runs in it, the newest first."""
+    """Return all recordings in a folder and in its subfolders, the newest first."""
     found = []
     for file in {*folder.glob("*.rrd"), *folder.glob("*/*.rrd")}:
         summary = None
         with suppress(OSError, msgspec.DecodeError):
             summary = msgspec.json.decode(summary_file(file).read_bytes(), type=Summary)
-        with suppress(FileNotFoundError):  # somebody removes it just now
+        with suppress(FileNotFoundError):  # somebody has just removed it
             info = file.stat()
             found.append(RecordingFile(file, info.st_size, info.st_mtime, summary))
     return sorted(found, key=lambda recording: recording.written, reverse=True)

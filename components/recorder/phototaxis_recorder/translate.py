@@ -1,4 +1,4 @@
-"""From log chunks to Rerun columns: each tick once, in batches, whoever resends what."""
+"""Converts log chunks to Rerun columns; each tick is written once, even when its chunk comes again."""
 
 import math
 from bisect import bisect_right
@@ -19,14 +19,14 @@ from phototaxis_recorder.layout import MEAN_TICKS, PAPER_SUCCESS_RATE, draw_worl
 from phototaxis_recorder.summary import Summary
 
 MAX_WAITING_ROWS = 4000
-"""Rows of one role that may wait for another's."""
+"""Rows of one role that may wait for those of another."""
 END_PHRASES = {"terminated": "reached the light", "truncated": "gave up", "reset": "was reset"}
 
 
 class Translator:
     """Writes one run into one Rerun recording.
 
-    Chunks are buffered by `add` and written by `flush`; a tick that a role has told already is left out.
+    `add` buffers chunks and `flush` writes them; a tick that a role has sent before is left out.
     """
 
     def __init__(self, recording: rr.RecordingStream, world: World):
@@ -43,7 +43,7 @@ class Translator:
         self._late = 0
         self._models = {"sonar": "", "light": ""}
         self._robots, self._system = world.robots, ("", "")
-        """How many robots there are; learner and percept that wrote last."""
+        """Number of robots; learner and percept of the newest chunk."""
         self._rewards: deque[float] = deque(maxlen=MEAN_TICKS)
         self.summary = Summary(world.run, world.arena.name, world.arena.digest)
         draw_world(recording, world.arena)
@@ -58,7 +58,7 @@ class Translator:
             self.agent(chunk)
 
     def sim(self, chunk: SimLog) -> None:
-        """Poses, commands and ended episodes."""
+        """Buffer poses and ended episodes, and note who drives and how many ticks were late."""
         self._add("sim", chunk.tick, chunk.x, chunk.y, chunk.heading)
         if chunk.driver != self._driver and chunk.tick:
             self._driver = chunk.driver
@@ -67,7 +67,7 @@ class Translator:
             self._text(chunk.tick[0], f"{self._driver or 'nobody'} drives")
             label = rr.Points2D([(0, 0)], labels=[self._driver], colors=BLUE, radii=0.02, show_labels=True)
             rr.log("world/robot/driver", label, recording=self._recording)
-        if chunk.late and chunk.late >= 2 * self._late:  # a few lines, however many there are
+        if chunk.late and chunk.late >= 2 * self._late:  # at each doubling, so that there are only a few lines
             self._late = chunk.late
             self._text(chunk.tick[0], f"{chunk.late} ticks without a command in time so far", rr.TextLogLevel.WARN)
         self._episodes += [episode for episode in chunk.ended if episode.episode > self._episode]
@@ -75,7 +75,7 @@ class Translator:
             self._episode = self._episodes[-1].episode
 
     def sensors(self, chunk: SensorsLog) -> None:
-        """Sonar and light, and which models they come from."""
+        """Buffer sonar and light readings, and note which models they come from."""
         for kind, model in (("sonar", chunk.sonar_model), ("light", chunk.light_model)):
             if model != self._models[kind]:
                 if self._models[kind] or model != "built-in":
@@ -87,17 +87,17 @@ class Translator:
         self._add("sensors", chunk.tick, sonar, light)
 
     def agent(self, chunk: AgentLog) -> None:
-        """Percepts, rewards and what is learned."""
+        """Buffer rewards and actions, and write what is learned."""
         self._system = chunk.learner, chunk.percept
         self._add("agent", chunk.tick, chunk.reward, chunk.td_error, chunk.temperature, chunk.action)
         if chunk.current:
             self._learned(chunk)
 
     def flush(self, last: bool = False) -> None:
-        """Write what is buffered, up to the newest tick of which pose, rays and reward are known.
+        """Write the buffered rows up to the newest tick whose pose, rays and reward are all known.
 
-        So the newest picture is of one moment. The rest waits for the other roles, unless this is the
-        `last` flush or too much is waiting.
+        So the newest picture shows one moment. Later rows wait for the other roles, unless this is the `last` flush
+        or too many rows wait.
         """
         waiting = max(map(len, self._rows.values()))
         known = min(self._newest["sim"], self._newest["sensors"])
@@ -130,7 +130,7 @@ class Translator:
             self._send("plots/td_error", tick, rr.Scalars.columns(scalars=error))
             self._send("plots/temperature", tick, rr.Scalars.columns(scalars=temperature))
             self._send("plots/action", tick, rr.Scalars.columns(scalars=action))
-        if last and self._newest["sim"] > self._newest["sensors"]:  # stopped before it was sensed: no rays of before
+        if last and self._newest["sim"] > self._newest["sensors"]:  # the last pose was not sensed: remove older rays
             self._at(self._newest["sensors"] + 1)
             rr.log("world/robot/sonar", rr.Clear(recursive=False), recording=self._recording)
         for episode in self._episodes:
@@ -152,17 +152,17 @@ class Translator:
         self.summary.epochs = max(self.summary.tick - self.summary.episodes, 0)
 
     def event(self, text: str) -> None:
-        """Something that happened to the system, told at the newest tick."""
+        """Write a line about the system at the newest tick."""
         self._text(max(*self._newest.values(), 0), text, rr.TextLogLevel.WARN)
 
     @property
     def _is_the_papers(self) -> bool:
-        """Whether what drives is the system for which the paper reports its 80%."""
+        """Whether the driver is the system for which the paper reports its 80% (section 6.2)."""
         built_in = set(self._models.values()) == {"built-in"}
         return self._system == ("qtable", "simple") and built_in and (self.summary.arena, self._robots) == ("paper", 1)
 
     def _running_mean(self, rewards: np.ndarray) -> np.ndarray:
-        """The mean of the last MEAN rewards at each of the new ones."""
+        """Return, for each new reward, the mean of the last MEAN_TICKS rewards."""
         means = []
         for reward in rewards:
             self._rewards.append(float(reward))
@@ -218,6 +218,6 @@ class Translator:
 
 
 def _at(wanted: np.ndarray, tick: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """The values at the wanted ticks (both ascending); NaN where there is none."""
+    """Return the values at the wanted ticks; NaN where there is none. `wanted` and `tick` ascend."""
     place = np.minimum(np.searchsorted(tick, wanted), len(tick) - 1)
     return np.where(tick[place] == wanted, values[place], np.nan)

@@ -1,4 +1,4 @@
-"""`phototaxis view`: the live view or a finished recording, in the native viewer or in the browser."""
+"""`phototaxis view`: shows the live view or a finished recording, in the native viewer or in the browser."""
 
 import os
 import signal
@@ -28,23 +28,23 @@ class Options(msgspec.Struct, kw_only=True):
     """Options of `phototaxis view`."""
 
     run: str = ""
-    """a recording (.rrd), a run in --out, or "last"; nothing: what is being recorded now"""
+    """a recording (.rrd), a run in --out, or "last"; without RUN: the live view of what is being recorded"""
     out: str = "runs"
     """folder of the runs"""
     web: bool = False
-    """in the browser; so too where there is no display"""
+    """show it in the browser; this is the default where there is no display"""
     picture: str = ""
-    """without a display, write what the viewer shows into this file: .png, or .gif for an animation"""
+    """open no window, but write what the viewer shows into this file: .png, or .gif for an animation"""
     seconds: Annotated[float, Meta(ge=1, le=60)] = 5.0
-    """when the picture is taken, and how long the animation is"""
+    """seconds before the picture is taken, and length of the animation"""
     grpc_port: PORT = 9876
-    """the recorder's port, for the live view; with a RUN in the browser, the port that serves it (0: any free one)"""
+    """for the live view, the recorder's port; for a RUN in the browser, the port that serves it (0: any free one)"""
     web_port: PORT = 9090
-    """the port of the web viewer (with a RUN, 0: any free one)"""
+    """port of the web viewer (with a RUN, 0: any free one)"""
 
 
 def main(argv: Sequence[str]) -> int:
-    about = "Open the live view, or with RUN (a file, a run's name, or last) a recording, in the same layout."
+    about = "Open the live view, or with RUN (a file, a run's name, or last) a recording; both have the same layout."
     options = parse(Options, argv, "phototaxis view", about, positional=["run"])
     if options.picture and Path(options.picture).suffix not in (".png", ".gif"):
         raise UserError(f"--picture {options.picture}: it must end in .png or .gif")
@@ -76,7 +76,7 @@ def has_display() -> bool:
 
 
 def find(run: str, folder: Path) -> Path:
-    """The recording that a person means.
+    """Find the recording that `run` names: a file, a run in `folder`, or "last".
 
     Raises
     ------
@@ -96,7 +96,10 @@ def find(run: str, folder: Path) -> Path:
 
 
 def whole(file: Path, folder: Path) -> Path:
-    """The recording itself, or where its recorder was killed or still writes, a copy of all that can be read of it."""
+    """Return a recording that Rerun can open: the file itself if it is complete, else a copy of its readable part.
+
+    A file is not complete while its recorder writes it, or after the recorder was killed.
+    """
     rrd = [rerun_program(), "rrd"]
     if subprocess.run([*rrd, "verify", file], capture_output=True, check=False).returncode == 0:
         return file
@@ -107,12 +110,12 @@ def whole(file: Path, folder: Path) -> Path:
     with copy.open("wb") as out:
         done = subprocess.run([*rrd, "optimize", "--continue-on-error", file], stdout=out, stderr=subprocess.DEVNULL)
     if done.returncode:
-        raise UserError(f"{file}: nothing of this recording can be read")
+        raise UserError(f"{file}: no part of this recording can be read")
     return copy
 
 
 def show(file: str, options: Options, web: bool) -> int:
-    """A finished recording, until Ctrl-C or until the window is closed."""
+    """Show a finished recording until Ctrl-C, or until the window is closed."""
     if options.picture:
         return draw(file, options)
     if not web:
@@ -127,7 +130,7 @@ def show(file: str, options: Options, web: bool) -> int:
 
 
 def draw(source: str, options: Options) -> int:
-    """The picture that is asked for."""
+    """Write the picture that --picture asks for."""
     from phototaxis_recorder.headless import picture
 
     picture(source, Path(options.picture), options.seconds)
@@ -135,7 +138,7 @@ def draw(source: str, options: Options) -> int:
 
 
 def native(*words: str) -> int:
-    """Run Rerun's program until it ends; with Ctrl-C both end."""
+    """Run Rerun's program until it ends; Ctrl-C ends it too."""
     viewer = subprocess.Popen([rerun_program(), *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     signal.signal(signal.SIGTERM, lambda *_: viewer.terminate())
     try:
@@ -145,6 +148,6 @@ def native(*words: str) -> int:
         viewer.communicate()
         raise
     if viewer.returncode not in (0, -signal.SIGTERM):
-        last = (errors.strip().splitlines() or ["without a word"])[-1]
-        raise ComponentFailed(f"the Rerun viewer ended with {viewer.returncode}: {last}")
+        last = (errors.strip().splitlines() or ["it printed no reason"])[-1]
+        raise ComponentFailed(f"the Rerun viewer ended with exit code {viewer.returncode}: {last}")
     return 0

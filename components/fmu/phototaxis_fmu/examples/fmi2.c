@@ -1,4 +1,4 @@
-/* FMI 2.0 co-simulation around a model. */
+/* Wraps a model (see model.h) as an FMI 2.0 co-simulation. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,4 +1,4 @@
-/* FMI 3.0 co-simulation around a model. */
+/* Wraps a model (see model.h) as an FMI 3.0 co-simulation. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -6,7 +6,7 @@
 #include "model.h"
 
 static const double starts[VARIABLES] = STARTS;
-static const size_t sizes[VARIABLES] = SIZES; /* number of values behind a value reference; 0: there is none */
+static const size_t sizes[VARIABLES] = SIZES; /* number of values of a value reference; 0: not a reference */
 
 static void begin(Model *m) {
     memset(m, 0, sizeof *m);

@@ -1,4 +1,4 @@
-/* The built-in light law: inverse square of the distance, full within 1 m; or linear up to `range`. */
+/* The built-in light law: inverse square of the distance, constant within 1 m; or linear up to `range`. */
 #include "names.h"
 
 int model_begin(Model *m) { return model_step(m, 0); }

@@ -1,4 +1,4 @@
-/* What a model is to fmi2.c and fmi3.c: all its variables in one array, and two functions.
+/* The interface between a model and its wrappers fmi2.c and fmi3.c: one array of all variables, and two functions.
  * The model itself includes names.h, which is generated too and names each variable. */
 #ifndef MODEL_H
 #define MODEL_H
@@ -10,10 +10,10 @@ typedef struct {
     double state;
 } Model;
 
-enum { GOOD = 0, DISCARD = 2, BROKEN = 3 }; /* as fmi2Status and fmi3Status */
+enum { GOOD = 0, DISCARD = 2, BROKEN = 3 }; /* same values as in fmi2Status and fmi3Status */
 
-int model_begin(Model *m); /* from the parameters and the first inputs */
+int model_begin(Model *m); /* computes the outputs at time 0 from the parameters and the first inputs */
 
-int model_step(Model *m, double period); /* from the inputs to the outputs, `period` seconds on */
+int model_step(Model *m, double period); /* computes the outputs `period` seconds later from the inputs */
 
 #endif

@@ -1,4 +1,4 @@
-/* A photodiode: sees best what is ahead, and saturates. `half` is the irradiance of half the full current. */
+/* A photodiode that is most sensitive straight ahead, and saturates. `half` irradiance gives half the full current. */
 #include <math.h>
 
 #include "names.h"

@@ -1,4 +1,4 @@
-/* A cheap ultrasonic ranger, 16 of them: nothing is nearer than `blind`, and ranges come in steps. */
+/* Sixteen cheap ultrasonic rangers: no reading is below `blind`, and readings are multiples of `resolution`. */
 #include <math.h>
 
 #include "names.h"

@@ -1,1 +1,1 @@
-"""The paper's experiments: what is run, which claim it answers, and the page that says so."""
+"""The reproduction of the paper: the experiments, the claims that they test, and the page of results."""

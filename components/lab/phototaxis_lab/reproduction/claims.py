@@ -1,4 +1,4 @@
-"""The paper's claims, each with what was measured and a verdict that follows from it."""
+"""The paper's claims; for each a function measures it and derives a verdict."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -11,16 +11,17 @@ from phototaxis_lab.cell import Outcome
 from phototaxis_lab.statistics import Interval, difference_interval, mean_interval, median_interval
 
 Data = Mapping[str, Mapping[int, Sequence[Outcome]]]
-"""Outcomes by the name of the system (`plan`) and by epochs, one for each seed."""
+"""Outcomes by name of the system (as in `plan`) and number of epochs; one for each seed."""
 
 
 class Finding(NamedTuple):
-    """What was measured, and what follows."""
+    """The measurement for a claim, and the verdict."""
 
     measured: str
     verdict: str
     """confirmed, refuted or undecided."""
     why: str
+    """A remark on the measurement or on its cause."""
 
 
 class Claim(NamedTuple):
@@ -32,29 +33,29 @@ class Claim(NamedTuple):
 
 
 def rates(outcomes: Sequence[Outcome]) -> list[float]:
-    """Success within 300 steps, seed by seed."""
+    """Return the success rates within 300 steps, one for each seed."""
     return [outcome.success_rate for outcome in outcomes]
 
 
 def mean(outcomes: Sequence[Outcome]) -> str:
-    """Mean success and its interval, in words."""
+    """Format the mean success and its interval."""
     return f"{np.mean(rates(outcomes)):.0%} {between(mean_interval(rates(outcomes)))}"
 
 
 def between(interval: Interval, sign: str = "") -> str:
-    """An interval of shares, in per cent."""
+    """Format an interval of shares in per cent."""
     return f"[{interval.low:{sign}.0%}, {interval.high:{sign}.0%}]"
 
 
 def decide(intervals: Sequence[Interval], level: float = 0.0) -> str:
-    """Confirmed when all intervals lie above the level, refuted when one lies below it, else undecided."""
+    """Return "confirmed" when all intervals lie above the level, "refuted" when one lies below it, else "undecided"."""
     if all(interval.low > level for interval in intervals):
         return "confirmed"
     return "refuted" if any(interval.high < level for interval in intervals) else "undecided"
 
 
 def compare(data: Data, better: str, worse: str, epochs: Sequence[int]) -> tuple[str, list[Interval]]:
-    """The success of one system less another's, in words and as intervals, after some numbers of epochs."""
+    """Compare the success of two systems after each number of epochs; return words, and intervals of the difference."""
     words, intervals = [], []
     for number in epochs:
         ours, theirs = rates(data[better][number]), rates(data[worse][number])
@@ -81,7 +82,7 @@ def simple_table(data: Data) -> Finding:
         f"median {np.median(found):.0%} {between(interval)}; {good} of {len(found)} seeds at 80% or more, worst "
         f"{min(found):.0%}",
         decide([interval], 0.8),
-        "the outcomes are bimodal: most seeds learn it, some do not, so the median is judged",
+        "the outcomes are bimodal (most seeds learn it, some do not), so we judge the median",
     )
 
 
@@ -89,7 +90,9 @@ def simple_net_is_worse(data: Data) -> Finding:
     """Claim 3."""
     words, gains = compare(data, "Q-table, simple", "net, simple", [3000])
     return Finding(
-        words, decide(gains), "the brighter side is coded 0, ½, 1 and the rewards differ by little in a sigmoid's range"
+        words,
+        decide(gains),
+        "the input codes the brighter side as 0, ½, 1, and in the range of a sigmoid the rewards differ by little",
     )
 
 
@@ -107,7 +110,7 @@ def rich_is_not_learnt(data: Data) -> Finding:
     return Finding(
         "after 5,000, 10,000, 30,000 epochs: " + "; ".join(words),
         verdict,
-        "+2 for any approach pays for wiggling in place as well as for coming; how much that costs depends on the "
+        "+2 for any approach rewards wiggling in place as well as coming closer; how much this costs depends on the "
         "discount, which the paper does not give: see the rows with other γ below",
     )
 
@@ -119,7 +122,7 @@ def rich_net_is_better(data: Data) -> Finding:
 
 
 def roughness(outcomes: Sequence[Outcome]) -> list[float]:
-    """How unsteady reward comes in, seed by seed: standard deviation over mean size of 100 equal stretches' rewards."""
+    """Return how unsteady the reward is, for each seed: standard deviation over mean size of 100 equal stretches."""
     stretches = [np.diff(outcome.rewards, prepend=0.0) for outcome in outcomes]
     return [float(one.std() / np.abs(one).mean()) for one in stretches]
 
@@ -137,10 +140,11 @@ def rich_net_is_steadier(data: Data) -> Finding:
 
 
 CROWDED = (1, 0, 0, 1), (2, 0, 0, 1), (0, 0, 0, 0)
+"""The states of the simple percept in which the paper's robot spent most of its time (section 6.2)."""
 
 
 def state_shares(outcomes: Sequence[Outcome]) -> np.ndarray:
-    """Share of the learning steps spent in each state, (seeds, states)."""
+    """Return the share of the learning steps spent in each state, shape (seeds, states)."""
     visits = np.array([outcome.visits for outcome in outcomes], dtype=float)
     return visits / visits.sum(axis=1, keepdims=True)
 
@@ -159,7 +163,7 @@ def time_piles_up(data: Data) -> Finding:
         f"{named}; most time is spent in {first}; with unchanged light {unchanged:.0%}; {back:.0%} of the steps "
         f"reverse the one before",
         verdict,
-        "of steps drawn at random 22% reverse the one before; in a room of 10 m with steps of 0.5 m the light seldom "
+        "of random steps 22% reverse the previous one; in a room of 10 m with steps of 0.5 m the light seldom "
         "stays the same for five steps; in the arena `pyro-realtime`, steps of 0.1 s, it does",
     )
 
@@ -171,7 +175,7 @@ def longer_separates(data: Data) -> Finding:
     return Finding(
         words,
         "refuted" if not apart[1] else "undecided" if apart[0] else "confirmed",
-        "confirmed would be: the interval excludes 0 after 60,000 epochs and did not yet after 30,000",
+        "it would be confirmed if the interval excluded 0 after 60,000 epochs but not after 30,000",
     )
 
 
@@ -191,7 +195,9 @@ def net_per_action_is_faster(data: Data) -> Finding:
     simple, first = compare(data, "net per action, simple", "net, simple", [1000, 3000])
     rich, second = compare(data, "net per action, rich", "net, rich", [5000])
     return Finding(
-        f"simple, {simple}; rich, {rich}", decide(first + second), "faster: more success after as many epochs"
+        f"simple, {simple}; rich, {rich}",
+        decide(first + second),
+        "faster means more success after the same number of epochs",
     )
 
 
@@ -202,7 +208,7 @@ def elman(data: Data) -> Finding:
     return Finding(
         f"simple, {simple}; rich, {rich}",
         decide(first + second),
-        'the paper makes no claim ("we are not sure"); judged is whether it is better than the plain net',
+        'the paper makes no claim ("we are not sure"); we test whether it is better than the plain net',
     )
 
 

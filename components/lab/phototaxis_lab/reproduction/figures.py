@@ -1,4 +1,4 @@
-"""The figures: readable in print, and without colour."""
+"""Draws the figures of the page; they are readable in print and without colour."""
 
 from collections.abc import Mapping, Sequence
 from io import BytesIO
@@ -33,17 +33,17 @@ LOOKS = (
     ("#0072B2", "o", "-"), ("#D55E00", "s", "--"), ("#009E73", "^", "-."), ("#CC79A7", "D", ":"),
     ("#E69F00", "v", (0, (5, 1))), ("#56B4E9", "P", (0, (3, 1, 1, 1))), ("#000000", "X", (0, (1, 1))),
 )  # fmt: skip
-"""Okabe and Ito's colours, which the colour-blind can tell apart, each with its own marker and dashes."""
+"""Okabe and Ito's colours, which colour-blind people can tell apart, each with a marker and a dash pattern."""
 
 Runs = Mapping[int, Sequence[Outcome]]
-"""The outcomes of one system's seeds, by the number of epochs."""
+"""The outcomes of one system by number of epochs; one for each seed."""
 
 
 @mpl.rc_context(STYLE)
 def success(path: Path, systems: Mapping[str, Runs], lines: Mapping[str, float], against: str = "epochs") -> None:
-    """Mean success of each system with its 95% interval, against epochs or ended episodes (figures 10 and 12).
+    """Draw the mean success of each system with its 95% interval, against epochs or episodes (figures 10 and 12).
 
-    `lines` are levels to compare with, by what they are.
+    `lines` are levels to compare with, by their names.
     """
     figure, axes = _figure(5.2, 3.4)
     for (name, runs), (colour, marker, dashes) in zip(systems.items(), LOOKS, strict=False):
@@ -58,7 +58,7 @@ def success(path: Path, systems: Mapping[str, Runs], lines: Mapping[str, float],
         axes.plot(x, means, color=colour, marker=marker, linestyle=dashes, label=name, markersize=5)
     for name, level in lines.items():
         axes.axhline(100 * level, color="0.35", linewidth=0.9, linestyle=(0, (2, 2)))
-        left = name.startswith("the paper")  # the others may lie close to it
+        left = name.startswith("the paper")  # on the left, since the other levels may be close to it
         place, side = (0.01, "left") if left else (1.0, "right")
         axes.annotate(name, (place, 100 * level), xycoords=("axes fraction", "data"), ha=side, va="bottom", fontsize=7)
     axes.set_xscale("log")
@@ -72,7 +72,7 @@ def success(path: Path, systems: Mapping[str, Runs], lines: Mapping[str, float],
 
 @mpl.rc_context(STYLE)
 def accumulated_reward(path: Path, systems: Mapping[str, Sequence[Outcome]], epochs: int) -> None:
-    """Accumulated reward over time: each seed thin, the mean bold (figure 11)."""
+    """Draw the accumulated reward over time: each seed as a thin line, the mean as a bold one (figure 11)."""
     figure, all_axes = _figure(6.4, 3.0, columns=len(systems))
     x = np.linspace(epochs / CURVE_POINTS, epochs, CURVE_POINTS)
     for axes, (name, outcomes), (colour, *_) in zip(all_axes, systems.items(), LOOKS, strict=False):
@@ -88,9 +88,9 @@ def accumulated_reward(path: Path, systems: Mapping[str, Sequence[Outcome]], epo
 
 @mpl.rc_context(STYLE)
 def time_in_states(path: Path, shares: np.ndarray, names: Sequence[str]) -> None:
-    """Share of the learning steps spent in each state: mean over seeds and its 95% interval (figure 13).
+    """Draw the share of the learning steps in each state: mean over seeds and its 95% interval (figure 13).
 
-    `shares` is (seeds, states), in 0..1.
+    `shares` has the shape (seeds, states), in 0..1.
     """
     figure, axes = _figure(6.4, 3.0)
     means = 100 * shares.mean(axis=0)
@@ -106,7 +106,7 @@ def time_in_states(path: Path, shares: np.ndarray, names: Sequence[str]) -> None
 
 @mpl.rc_context(STYLE)
 def table(path: Path, values: np.ndarray, names: Sequence[str]) -> None:
-    """The learned Q-table, states by actions, the best action of each state marked (figure 6)."""
+    """Draw the learned Q-table, states by actions, and mark the best action of each state (figure 6)."""
     figure, axes = _figure(4.6, 5.4)
     most = float(np.abs(values).max())
     image = axes.imshow(values, cmap="PuOr", vmin=-most, vmax=most, aspect="auto")

@@ -1,4 +1,4 @@
-"""The page: claims and verdicts, figures, every system in one table, and what had to be filled in."""
+"""Writes the page of results: claims and verdicts, figures, tables of all systems, and hyperparameters."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -29,11 +29,11 @@ from phototaxis_lab.reproduction.plan import (
 from phototaxis_lab.statistics import mean_interval, median_interval
 
 TUNING = "100 to 460"
-"""The seeds that hyperparameters were chosen on."""
+"""The seeds on which the hyperparameters were chosen."""
 
 
 Fresh = Mapping[tuple[System, int], Sequence[Outcome]]
-"""Outcomes of each system and number of epochs, on the seeds of `fresh_seeds`."""
+"""Outcomes of each system and number of epochs on the seeds of `fresh_seeds`."""
 
 
 def write(folder: Path, data: Data, fresh: Fresh, seeds: range) -> None:
@@ -57,7 +57,7 @@ def write(folder: Path, data: Data, fresh: Fresh, seeds: range) -> None:
 
 
 def controllers(name: str, seeds: range) -> dict[str, list[Evaluation]]:
-    """What learns nothing, measured like the learners: on the same placements."""
+    """Measure the controllers that do not learn, on the same placements as the learners."""
     arena = arenas.load(name)
     kinds: dict[str, Callable[[int], Drive]] = {
         "random, 9 actions": lambda seed: Random(range(9), seed),
@@ -68,7 +68,7 @@ def controllers(name: str, seeds: range) -> dict[str, list[Evaluation]]:
 
 
 def draw(folder: Path, data: Data, seeds: range, fixed: Mapping[str, Sequence[Evaluation]]) -> None:
-    """All figures."""
+    """Draw all figures."""
     levels = {
         "random actions": fixed["random, 9 actions"],
         "hand-written controller": fixed["Braitenberg, hand-written"],
@@ -89,7 +89,7 @@ def draw(folder: Path, data: Data, seeds: range, fixed: Mapping[str, Sequence[Ev
 
 
 def claims_table(data: Data) -> str:
-    """One row for each claim."""
+    """Return the table of claims, one row for each."""
     rows = ["| | claim | section | measured | verdict | why |", "|--:|---|---|---|---|---|"]
     for number, claim in enumerate(CLAIMS, start=1):
         found = claim.judge(data)
@@ -100,7 +100,7 @@ def claims_table(data: Data) -> str:
 
 
 def systems_table(plan: Plan, data: Data, fixed: Mapping[str, Sequence[Evaluation]]) -> str:
-    """One row for each system and number of epochs, after what learns nothing."""
+    """Return a table with rows for the controllers that do not learn, then for each system and number of epochs."""
     rows = [
         "| system | reward | epochs | median [95%] | worst | mean [95%] | worst in 100 | path ratio | seeds ≥ 95% |",
         "|---|---|--:|---|--:|---|--:|--:|--:|",
@@ -131,7 +131,7 @@ def _columns(found: Sequence[Outcome] | Sequence[Evaluation]) -> str:
 
 
 def fresh_table(fresh: Fresh) -> str:
-    """One row for each system, with its worst five seeds."""
+    """Return a table with one row for each system and its five worst seeds."""
     rows = ["| learner, percept | epochs | median [95%] | seeds ≥ 95% | worst five seeds |", "|---|--:|---|--:|---|"]
     for (system, epochs), found in fresh.items():
         rates = [one.success_rate for one in found]

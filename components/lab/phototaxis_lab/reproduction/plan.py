@@ -1,11 +1,11 @@
-"""What is run: the systems of the paper, those it proposes, and those that go beyond it."""
+"""The experiments: the systems of the paper, those that it proposes, and those that go beyond it."""
 
 from collections.abc import Mapping
 
 from phototaxis_lab.cell import Cell, System
 
 Plan = Mapping[str, tuple[System, tuple[int, ...]]]
-"""Systems by the name the page gives them, each with its numbers of epochs."""
+"""Systems by their name on the page, each with its numbers of epochs."""
 
 SIMPLE = 300, 1000, 3000, 10_000
 RICH = 1000, 5000, 10_000, 30_000, 60_000
@@ -16,7 +16,7 @@ PAPER: Plan = {
     "Q-table, rich": (System("qtable", "rich", "static"), RICH),
     "net, rich": (System("ann", "rich", "static"), RICH),
 }
-"""The four systems of sections 5 and 6, each with the reward that the paper gave it."""
+"""The four systems of sections 5 and 6, each with the reward that the paper gives it."""
 
 EXCHANGED: Plan = {
     "Q-table, simple, static reward": (System("qtable", "simple", "static"), (3000,)),
@@ -24,14 +24,14 @@ EXCHANGED: Plan = {
     "Q-table, rich, difference reward": (System("qtable", "rich", "difference"), (10_000,)),
     "net, rich, difference reward": (System("ann", "rich", "difference"), (10_000,)),
 }
-"""Each with the other's reward: the comparison that section 6.2 hopes for."""
+"""The same systems with the rewards of simple and rich exchanged: the comparison that section 6.2 hopes for."""
 
 DISCOUNTS: Plan = {
     "Q-table, rich, γ 0.5": (System("qtable", "rich", "static", options=(("gamma", 0.5),)), (10_000,)),
     "Q-table, rich, γ 0.95": (System("qtable", "rich", "static", options=(("gamma", 0.95),)), (10_000,)),
     "net, rich, γ 0.9": (System("ann", "rich", "static", options=(("gamma", 0.9),)), (10_000,)),
 }
-"""The rich systems with other discounts, which the paper does not give."""
+"""The rich systems with other discounts, because the paper does not give its own."""
 
 PROPOSED: Plan = {
     "linear net, simple": (System("ann-linear", "simple", "difference"), (1000, 3000)),
@@ -41,7 +41,7 @@ PROPOSED: Plan = {
     "net per action, rich": (System("ann-per-action", "rich", "static"), (5000, 10_000)),
     "Elman net, rich": (System("elman", "rich", "static"), (5000, 10_000)),
 }
-"""Section 8, future directions."""
+"""The systems that section 8 (future directions) proposes."""
 
 BEYOND: Plan = {
     "qlambda, simple": (System("qlambda", "simple"), (300, 1000, 3000)),
@@ -52,7 +52,7 @@ BEYOND: Plan = {
     "dqn, rich": (System("dqn", "rich"), (5000, 10_000)),
     "dqn, continuous": (System("dqn", "continuous"), (500, 1000)),
 }
-"""Learners that the paper did not have, with the rewards and hyperparameters that suit them."""
+"""Learners that the paper does not have, with their own rewards and hyperparameters."""
 
 SHADOWS: Plan = {
     f"{learner}, {percept}, shadows": (System(learner, percept, arena="shadows"), (epochs,))
@@ -68,15 +68,16 @@ SHADOWS: Plan = {
         ("dqn", "continuous", 5000),
     )
 }
-"""Every kind of learner where obstacles shadow the light."""
+"""All kinds of learners in an arena whose obstacles shadow the light."""
 
 PARTS: Mapping[str, Plan] = {
     "paper": {**PAPER, **EXCHANGED, **DISCOUNTS, **PROPOSED},
     "beyond": {**BEYOND, **SHADOWS},
 }
-"""What is computed one after the other, each in a folder of its own."""
+"""The parts that are computed one after the other, each with a folder of its own."""
 
 WHOLE: Plan = {name: planned for plan in PARTS.values() for name, planned in plan.items()}
+"""All systems of all parts."""
 
 FRESH: Plan = {
     f"{learner}, {percept}": (System(learner, percept), (epochs,))
@@ -94,14 +95,14 @@ FRESH: Plan = {
         ("dqn", "continuous", 1000),
     )
 }
-"""Every learner as it comes, on seeds that nothing was chosen on and nothing else is reported on."""
+"""Every learner with its presets, on seeds on which nothing was tuned and nothing else is reported."""
 
 
 def fresh_seeds(seeds: range) -> range:
-    """Five times as many seeds as elsewhere, from 1,000 on."""
+    """Return five times as many seeds as `seeds` has, from 1,000 on."""
     return range(1000, 1000 + 5 * len(seeds))
 
 
 def cells(plan: Plan, seeds: range) -> list[Cell]:
-    """Everything that is planned, with every seed."""
+    """Return the cells of a plan: each system and number of epochs with every seed."""
     return [Cell(system, epochs, seed) for system, budgets in plan.values() for epochs in budgets for seed in seeds]
