@@ -19,7 +19,7 @@ RELEASE_WITHIN_S = 0.5
 
 
 class Place(StrEnum):
-    """Where a client stands with respect to the seat."""
+    """A client's state with respect to the seat."""
 
     SEEKING = "seeking"
     """Nobody drives, as far as it knows."""
@@ -115,7 +115,7 @@ class SeatClient:
 
     @property
     def place(self) -> Place:
-        """Where the client stands."""
+        """The client's state with respect to the seat."""
         return self._place.state
 
     def see(self, readings: Readings | BatchReadings, now: float) -> list[Effect]:
