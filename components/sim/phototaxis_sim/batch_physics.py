@@ -138,9 +138,7 @@ class BatchPhysics:
         row = np.where(mine[:, 0], rows[:, 0], rows[:, 1])
         points, there = floats[:, 2:].reshape(-1, 2, 3), np.arange(2) < ids[:, 2:]  # x, y, distance
         np.maximum.at(self._depth, row, np.where(there, np.maximum(-points[:, :, 2], 0.0), -1.0).max(axis=1))
-        pressed = (floats[:, 0] != 0) | (
-            floats[:, 1] != 0
-        )  # without an impulse a robot moves along a wall or away from it
+        pressed = (floats[:, 0] != 0) | (floats[:, 1] != 0)  # an impulse: the robot is not just beside a wall
         if not pressed.any():
             return
         row, points, there = row[pressed], points[pressed], there[pressed]
