@@ -87,8 +87,8 @@ def test_what_a_file_leaves_out_is_shut(mode):
         ({"scouting": {"multicast": {"enabled": True}}}, "scouting/multicast/enabled"),
         ({"scouting": {"gossip": {"enabled": True}}}, "scouting/gossip/enabled"),
         ({"adminspace": {"enabled": True, "permissions": {"write": True}}}, "adminspace/permissions/write"),
-        ({"plugins": {"rest": {"http_port": 8000}}}, "plugins may open"),
-        ({"plugins_loading": {"enabled": True}}, "plugins_loading may open"),
+        ({"plugins": {"rest": {"http_port": 8000}}}, "plugins may let other machines in"),
+        ({"plugins_loading": {"enabled": True}}, "plugins_loading may let other machines in"),
     ],
 )
 def test_a_door_that_a_file_asks_for_is_refused_by_name(file, sections, door):

@@ -22,23 +22,23 @@ class Options(ComponentOptions, kw_only=True):
     """Options of the agent process."""
 
     worlds: WorldNames | None = None
-    """in place of --name: several worlds, separated by commas, each driven by an agent of its own in this process"""
+    """several worlds instead of --name, separated by commas; this process runs one agent for each"""
     checkpoint: str = ""
-    """file to keep the learner's state in (.npz); with --worlds a folder, in it WORLD.npz"""
+    """file (.npz) in which the learner's state is kept; with --worlds a folder that holds WORLD.npz for each"""
     resume: str = ""
     """checkpoint to begin with"""
     take_over: bool = False
-    """take the seat from whoever drives, at the next tick boundary, and leave when a successor drives"""
+    """take the seat from the driver at the next tick boundary, and exit when a successor drives"""
     at: Count = 0
-    """with --take-over: not before this tick"""
+    """first tick at which --take-over may happen"""
     standby: bool = False
-    """drive when the driver vanishes; until then keep in step with it, or learn from what it does"""
+    """drive when the driver vanishes; until then keep its state (same learner and percept) or learn from its driving"""
     policy: str = ""
-    """a frozen policy in the place of a learner: a file (.zip) that Stable-Baselines3 has saved"""
+    """file (.zip) with a frozen policy saved by Stable-Baselines3, which drives instead of a learner"""
     trust: bool = False
-    """load the policy although such a file can run any code: you trust who made it"""
+    """load the policy file, which can run any code; use this only if you trust its author"""
     normalize: str = ""
-    """statistics of the policy's observations: the file (.pkl) of VecNormalize.save, or none"""
+    """file (.pkl) of VecNormalize.save with the statistics of the policy's observations"""
     agent_seed: Seed | None = None
     """seed of the learner and its exploration (default: the run's)"""
 

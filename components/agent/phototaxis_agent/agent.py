@@ -15,9 +15,9 @@ from phototaxis_agent.policy import Policy
 class Agent(SeatedAgent):
     """Turns readings into commands, and lets its policy learn from what they led to.
 
-    The action that is learned from is the one that the readings say was applied, whoever chose it, so
-    that an agent may also learn from another's driving; a command that is not one of the nine breaks
-    the chain and nothing is learned from that step.
+    It learns from the action that the readings report as applied, so that it can also learn from another agent's
+    driving. From a command that is not one of the nine actions it learns nothing, and the next transition does not
+    continue the one before.
     """
 
     def __init__(self, policy: Policy):

@@ -1,4 +1,4 @@
-"""What answers the ticks of a world: one robot's agent or one for many, behind one interface."""
+"""Answers the ticks of a world, with one robot or with many, behind one interface."""
 
 from typing import Any, NamedTuple
 

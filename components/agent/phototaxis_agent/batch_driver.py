@@ -1,4 +1,4 @@
-"""One policy that drives many robots: each has its own episode, all learn into the same values."""
+"""Drives many robots with one policy: each has its own episode, and all learn into the same values."""
 
 import numpy as np
 from phototaxis.runtime.seated import SeatedAgent
@@ -9,8 +9,8 @@ from phototaxis.wire.messages import ENDS, BatchCommand, BatchReadings, Readings
 class BatchDriver:
     """Answers for N robots, one after the other in each tick, so that runs can be repeated.
 
-    What the learner hears are single transitions: none continues the one before, so eligibility traces
-    reach back no further than one step.
+    The learner gets single transitions: none continues the one before, so eligibility traces reach back only
+    one step.
     """
 
     def __init__(self, agent: SeatedAgent, robots: int):

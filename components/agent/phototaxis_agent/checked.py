@@ -1,4 +1,4 @@
-"""A learner as its hosts meet it: what it gives is checked and made plain, what it raises is one line."""
+"""Wraps a learner: checks and converts what it returns, and turns its exceptions into one-line errors."""
 
 import sys
 import traceback
@@ -18,11 +18,11 @@ _OWN = {float, int}
 
 
 class CheckedLearner(Learner):
-    """Calls a learner that anybody may have written, and answers for it.
+    """Calls a learner from any author, and checks everything that it returns.
 
-    Numbers of NumPy, PyTorch and the like become Python's. What is not finite, or not as many numbers as there
-    are actions, ends the run with a line that names the learner, the state and the step; so does whatever the
-    learner raises, with its file and line. The usual case, a list of floats, costs a fraction of a microsecond.
+    Numbers of NumPy, PyTorch and others become Python numbers. A value that is not finite, or a wrong count of
+    values, ends the run with a line that names the learner, the state and the step. So does an exception of the
+    learner, with its file and line. The usual case, a list of floats, costs a fraction of a microsecond.
 
     Parameters
     ----------

@@ -17,6 +17,6 @@ def remember(action: Any, gain: Any) -> tuple[Any, Any]:
 
 
 def mirror(percept: Percept, state: PerceptState) -> PerceptState:
-    """What a mirror would show of a state that ends with this context."""
+    """The mirror image of a state that ends with this context."""
     *seen, action, trend = state
     return *percept.mirror(tuple(seen)), (MIRRORED[int(action) - 1] + 1 if action else 0), trend

@@ -7,7 +7,7 @@ from msgspec import Meta, Struct
 
 
 class Exploration(Struct, frozen=True, kw_only=True):
-    """How actions are drawn, and how the draw gets greedier.
+    """How random the choice of actions is, and how that falls during a run.
 
     The temperature falls geometrically from `temperature_start` to `temperature_end` over the share
     `exploration_fraction` of the budget and stays there.

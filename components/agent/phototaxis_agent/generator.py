@@ -1,4 +1,4 @@
-"""The state of a random generator as JSON can hold it: its whole numbers, which exceed 64 bits, are text."""
+"""Saves the state of a random generator as JSON; its integers exceed 64 bits, so they are stored as text."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""From states to the inputs of a net."""
+"""Turns states into the inputs of a neural net."""
 
 import numpy as np
 import torch

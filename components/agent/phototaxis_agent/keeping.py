@@ -1,4 +1,4 @@
-"""How an agent is kept: a checkpoint now and then, and a journal of the readings since."""
+"""Decides when an agent writes a checkpoint, and keeps a journal of the readings since then."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -52,11 +52,11 @@ class Keeping:
         return self._again(frames, run, tick) if self._wanted and frames and frames[0] == run.encode() else None
 
     def begin(self, run: str, agent: SeatedAgent, now: float) -> list[Effect]:
-        """A new journal for a run. What the agent has learned in another one since its checkpoint is saved first."""
+        """Begin a new journal for a run, after a checkpoint of what the agent has learned in another run."""
         return [*self.save(agent, now), Begin(run.encode())] if self._wanted else []
 
     def entry(self, readings: Readings) -> list[Effect]:
-        """One tick."""
+        """Add one tick's readings to the journal."""
         return [Append(msgspec.msgpack.encode(readings))] if self._wanted else []
 
     def due(self, now: float) -> bool:
@@ -75,7 +75,7 @@ class Keeping:
         return [Save(meta, arrays, agent.tick[0].encode(), last)]
 
     def write_failure(self, what: Unwritten, agent: SeatedAgent | None, now: float) -> list[Effect]:
-        """The disk did not take something: warn, and replace a journal that was given up by a checkpoint."""
+        """After a failed write: warn, and replace a journal that was given up by a checkpoint."""
         again = what.what == "journal" and agent is not None and agent.tick != self._saved
         self._saved = None
         told = Warn(f"{what.why}; if it dies now, what it learned since its last checkpoint is lost")

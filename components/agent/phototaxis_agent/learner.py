@@ -1,4 +1,4 @@
-"""What a learner is, and how one is found by its name."""
+"""The base class of learners, and how a learner is found by its name."""
 
 import sys
 from importlib.machinery import PathFinder
@@ -14,7 +14,7 @@ from phototaxis.task import PERCEPTS, Percept, PerceptState
 LEARNER_GROUP = "phototaxis.learners"
 POLICY_GROUP = "phototaxis.policies"
 INSTALL_HINTS = {LEARNER_GROUP: "'phototaxis[agent]'", POLICY_GROUP: "'phototaxis[gym]' stable-baselines3"}
-"""What brings the packages that our own entry points need."""
+"""What to install with pip for the entry points of Phototaxis, by entry-point group."""
 
 
 class Transition(NamedTuple):
@@ -26,11 +26,11 @@ class Transition(NamedTuple):
     reward: float
     next_state: PerceptState
     terminated: bool
-    """The light was reached: nothing follows. (An episode cut short is not terminated.)"""
+    """Whether the light was reached, so that no further reward follows. (A truncated episode is not terminated.)"""
     progress: float
-    """Share of the budget of learning steps that is used, 0..1: for rates that fall."""
+    """Share of the budget of learning steps used so far, 0..1, from which falling rates are computed."""
     first: bool
-    """Nothing leads here: an episode begins, or steps were missed. (Else it continues the last transition.)"""
+    """Whether it does not continue the last transition: an episode begins, or steps were missed."""
 
 
 class Learner:
@@ -54,7 +54,7 @@ class Learner:
         raise NotImplementedError
 
     def learn(self, transition: Transition) -> float:
-        """Take in one transition; the temporal-difference error before the update."""
+        """Learn from one transition; return the temporal-difference error before the update."""
         raise NotImplementedError
 
     def save(self) -> dict[str, np.ndarray]:

@@ -1,7 +1,7 @@
 """The paper's neural net (figure 8) in PyTorch: one hidden layer, back-propagation one example at a time.
 
-The nets are so small that the price of a call decides: autograd would cost four times the gradient's
-closed form, which for one hidden layer is four lines.
+The nets are so small that the overhead of each call dominates: autograd would take four times as long as the
+gradient in closed form, which is four lines for one hidden layer.
 """
 
 from typing import Annotated, Any
@@ -14,7 +14,7 @@ from phototaxis_agent.learner import stored
 
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
-    """Of a net and of what it learns."""
+    """Hyperparameters of the neural nets."""
 
     target_rate: Annotated[float, Meta(gt=0, le=1)] = 1.0
     """α of equation 1: how far the target lies from the present Q towards r + γ max Q"""
@@ -23,11 +23,11 @@ class Hyperparameters(Struct, frozen=True, kw_only=True):
     learning_rate: Annotated[float, Meta(gt=0, le=10)] = 0.1
     """learning rate of back-propagation (conx: 0.1)"""
     momentum: Annotated[float, Meta(ge=0, lt=1)] = 0.9
-    """share of the last change of weights that is made again (conx: 0.9)"""
+    """share of the last weight change that is added to the next (conx: 0.9)"""
     hidden: Annotated[int, Meta(ge=1, le=1000)] = 4
     """hidden units"""
     initial_range: Annotated[float, Meta(gt=0, le=10)] = 0.1
-    """weights and biases begin uniform in ± this (conx: 0.1)"""
+    """initial weights and biases are uniform in ± this value (conx: 0.1)"""
 
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -40,7 +40,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "max_episode_steps": 300,
     },
 }
-"""What was best for the paper's net; the other nets take the same, so that they can be compared with it."""
+"""Presets that were best for the paper's net; the other nets use the same, so that results are comparable."""
 
 
 class Perceptron:

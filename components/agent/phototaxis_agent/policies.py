@@ -1,4 +1,4 @@
-"""Files with frozen policies of others, which drive in the place of a learner: found by their suffix."""
+"""Loads frozen policies from files, which drive instead of a learner; the file's suffix selects the loader."""
 
 from importlib.metadata import entry_points
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What decides and learns, for one robot or for many that share it."""
+"""Chooses actions and learns, for one robot or for many that share the policy."""
 
 import math
 from collections.abc import Generator
@@ -155,7 +155,7 @@ class Policy:
 
     @contextmanager
     def _aside(self) -> Generator[None]:
-        """Ask the learner something without an influence on the run: what it draws meanwhile is drawn again."""
+        """Call the learner without an influence on the run: the random generator is reset afterwards."""
         drawn = self._rng.bit_generator.state
         yield
         self._rng.bit_generator.state = drawn

@@ -1,4 +1,4 @@
-"""What an agent tells the recording: a row for each tick, and now and then all its values."""
+"""Makes the agent's log: a row for each tick, and now and then all its values."""
 
 import time
 from collections.abc import Callable

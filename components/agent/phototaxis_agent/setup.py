@@ -1,4 +1,4 @@
-"""From a command line to an agent: the same options over the bus and in one process."""
+"""Makes an agent from command-line options, over the bus and in one process alike."""
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,7 +22,7 @@ from phototaxis_agent.watchdog import watchdog
 
 
 class LearnerOptions(Struct, kw_only=True):
-    """Which learner."""
+    """The option that selects the learner."""
 
     learner: str = "qtable"
     """name of the learner"""
@@ -103,7 +103,7 @@ def _refuse_doubles(learner: str, structs: Iterable[type[Any]], others: Iterable
 
 
 DEFAULT_BUDGET_EPOCHS = 3000
-"""Epochs that the temperature's decay is spread over in a run without an end."""
+"""Epochs over which the temperature falls in a run without an end."""
 
 
 def from_checkpoint(meta: CheckpointMetadata, source: str) -> AgentSetup:

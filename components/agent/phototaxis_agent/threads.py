@@ -1,4 +1,4 @@
-"""PyTorch on one thread while a net computes, and as it was for whoever else uses it in the process."""
+"""Runs PyTorch on one thread while a net computes, and then restores the process's setting."""
 
 import functools
 from collections.abc import Callable
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 def one_thread(function: Callable[P, T]) -> Callable[P, T]:
-    """Let a function compute on one thread: then sums have one order, and nets of this size only lose by more."""
+    """Let a function compute on one thread: sums have a fixed order, and more threads slow small nets down."""
 
     @functools.wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> T:

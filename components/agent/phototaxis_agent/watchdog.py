@@ -1,4 +1,4 @@
-"""A learner that does not return is named, with the file and line where it is."""
+"""Warns when a learner does not return from a call, with the file and line where it is."""
 
 import sys
 import threading

@@ -19,7 +19,7 @@ class Info(Struct, kw_only=True):
     file: str
     """the FMU"""
     allow_invalid: bool = False
-    """show an FMU even if its description does not follow the standard's schema"""
+    """show an FMU whose model description does not validate against the standard's schema"""
     json: bool = False
     """print the result as one JSON object"""
 
@@ -47,7 +47,7 @@ class Check(Struct, kw_only=True):
     allow_compile: bool = False
     """compile an FMU that contains only C sources; this runs its author's build"""
     allow_invalid: bool = False
-    """use an FMU even if its description does not follow the standard's schema"""
+    """use an FMU whose model description does not validate against the standard's schema"""
     json: bool = False
     """print the result as one JSON object"""
 

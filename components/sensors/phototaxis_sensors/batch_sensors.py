@@ -45,4 +45,4 @@ class BatchSensors:
         """No-op: the models are pure functions of the pose."""
 
     def begun_anew(self, tick: int) -> None:
-        """No-op: nothing is lost."""
+        """No-op: the models do not depend on earlier ticks."""

@@ -49,7 +49,7 @@ class Provided(SensorFactory, Protocol):
     """The sensors of a provider, which hold processes or other things of the machine until they are closed."""
 
     def try_out(self) -> None:
-        """Load what the options name, so that what is wrong with it is said before a run; `UserError` then."""
+        """Load the models that the options name before the run begins; `UserError` if that fails."""
         ...
 
     def close(self) -> None: ...

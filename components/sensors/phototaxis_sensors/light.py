@@ -22,12 +22,12 @@ class Sight(NamedTuple):
 
     @property
     def distance(self) -> float:
-        """m"""
+        """Distance from the sensor to the lamp, m."""
         return math.hypot(self.ahead, self.aside)
 
     @property
     def bearing(self) -> float:
-        """From straight ahead, to the left positive, rad."""
+        """Direction of the lamp from straight ahead, rad, positive to the left."""
         return math.atan2(self.aside, self.ahead)
 
 
@@ -87,7 +87,7 @@ class LightModel(BuiltIn):
         return left, right
 
     def _reading(self, sight: Sight) -> float:
-        """What one lamp gives to one sensor."""
+        """The reading that one lamp gives one sensor."""
         return sight.brightness * self._falloff(sight.distance) if sight.visible else 0.0
 
     def _falloff(self, distance: float) -> float:

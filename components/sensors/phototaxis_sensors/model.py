@@ -1,4 +1,4 @@
-"""What a sensor model is: readings without noise, tick by tick."""
+"""The interface of a sensor model, which computes readings without noise, tick by tick."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
@@ -36,7 +36,7 @@ class BuiltIn:
     stateful = False
 
     def begun_anew(self, tick: int) -> None:
-        """Nothing is lost."""
+        """No-op: the model does not depend on earlier ticks."""
 
 
 class SensorModel(Protocol):
@@ -44,7 +44,7 @@ class SensorModel(Protocol):
 
     @property
     def name(self) -> str:
-        """For the recording."""
+        """Name of the model, for the recording."""
         ...
 
     @property
@@ -53,7 +53,7 @@ class SensorModel(Protocol):
         ...
 
     def begun_anew(self, tick: int) -> None:
-        """What was before this tick of an episode is not to be had."""
+        """Begin at this tick of an episode, although its earlier ticks are unknown."""
 
     def __call__(self, moment: Moment) -> Sequence[float]:
         """The readings: 16 ranges in m, or two lights in 0..1."""

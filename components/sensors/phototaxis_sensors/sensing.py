@@ -88,16 +88,16 @@ class Sensing:
     """
 
     deadline = math.inf
-    """It waits for messages alone."""
+    """The sensors have no deadline: they wait only for messages."""
 
     def __init__(self, make: Callable[[World], Suite[Any, Any]]):
         self._make = make
         self._phase = Transitions(TABLE, Phase.IDLE)
         self._session: Session | None = None
         self._wanted = Place("", "")
-        """Where the states that wait belong."""
+        """The run and topic of the waiting states."""
         self._waiting: dict[int, Any] = {}
-        """By their ticks."""
+        """The waiting states, by tick."""
 
     def on(self, event: Event, now: float) -> list[Effect]:
         """What follows from an event."""

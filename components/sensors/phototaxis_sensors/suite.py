@@ -21,7 +21,7 @@ class Suite(Protocol[StateT, ReadingsT]):
 
     @property
     def stateful(self) -> bool:
-        """Earlier ticks of the episode matter; then each tick is asked once, in order."""
+        """Whether readings depend on earlier ticks of the episode; then each tick is asked once, in order."""
         ...
 
     @property
@@ -44,11 +44,11 @@ class Suite(Protocol[StateT, ReadingsT]):
         ...
 
     def follow(self, moment: Moment) -> None:
-        """Let models that remember know of a moment that has been answered by another suite."""
+        """Lead stateful models through a tick that another suite has answered."""
         ...
 
     def begun_anew(self, tick: int) -> None:
-        """Tell models that remember that what was before this tick of an episode is not to be had."""
+        """Tell stateful models that the ticks of the episode before this one are unknown."""
         ...
 
 
@@ -101,12 +101,12 @@ class SensorSuite:
         )  # fmt: skip
 
     def follow(self, moment: Moment) -> None:
-        """Let models that remember know of a moment that has been answered by another suite."""
+        """Lead stateful models through a tick that another suite has answered."""
         for model in self._models:
             model(moment)
 
     def begun_anew(self, tick: int) -> None:
-        """Tell models that remember that what was before this tick of an episode is not to be had."""
+        """Tell stateful models that the ticks of the episode before this one are unknown."""
         for model in self._models:
             model.begun_anew(tick)
 

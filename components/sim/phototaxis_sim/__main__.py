@@ -21,7 +21,7 @@ class Options(ComponentOptions, kw_only=True):
     arena: str = "paper"
     """name of a shipped arena, or a TOML file"""
     seed: Seed = 0
-    """decides placements and sensor noise"""
+    """seed of the placements and the sensor noise"""
     epochs: Count = 0
     """learning steps after which the run is finished; 0: run until stopped"""
     speed: Annotated[float, Meta(ge=0, le=1000)] = 0.0
@@ -29,11 +29,11 @@ class Options(ComponentOptions, kw_only=True):
     run: Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["run-1"])] = ""
     """name of the run (default: date, time and a few random letters)"""
     driver_timeout: Annotated[float, Meta(gt=0)] = 5.0
-    """seconds after which a driver that is there but silent loses the seat, if somebody else waits for it"""
+    """seconds after which a silent driver loses the seat, if another agent waits for it"""
     robots: Annotated[int, Meta(ge=1, le=MAX_ROBOTS)] = 1
-    """so many robots at once, each alone in its arena, placed as with the seeds from `seed` on"""
+    """number of robots, each alone in its arena; robot i starts as in a run with the seed `seed` + i"""
     journal: str = ""
-    """file that lets a killed simulation continue its run (of one robot)"""
+    """file from which a killed simulation continues its run (with one robot only)"""
 
 
 def main(argv: Sequence[str] | None = None) -> None:

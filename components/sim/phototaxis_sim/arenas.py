@@ -16,7 +16,7 @@ from phototaxis_sim.survey import survey
 _FOLDER = resources.files("phototaxis_sim") / "arenas"
 _MAX_BYTES = 16_000_000
 _surveyed: dict[str, list[str]] = {}
-"""What `survey` said, by the arena's digest."""
+"""Results of `survey`, by the arena's digest."""
 
 
 def shipped() -> list[str]:
@@ -48,18 +48,18 @@ def load(name: str) -> Arena:
 
 
 def load_checked(name: str, goal: bool = True) -> Arena:
-    """As `load`, for a command that is about to use the arena: what is suspicious about it is a warning on stderr.
+    """Load an arena as `load` does, and warn on stderr about anything suspicious in it.
 
-    Without `goal`, as where episodes end by themselves, no light needs to be bright enough to be reached.
+    Without `goal` no light needs to be bright enough to count as reached.
 
     Raises
     ------
     UserError
-        as in `load`, and when the robot can be placed nowhere, or hardly anywhere but where the light is reached
-        already, or when no light can ever be reached.
+        as in `load`; also when the robot fits nowhere, when the light is already reached at nearly all placements,
+        and when no light can ever be reached.
     """
     arena = load(name)
-    if name in shipped():  # there is nothing suspicious about them: a test says so
+    if name in shipped():  # a test checks the shipped arenas
         return arena
     if arena.name in shipped() and arena.digest != load(arena.name).digest:
         warn(f"{name}: name: '{arena.name}' is the name of a shipped arena, and this is another world")
@@ -90,7 +90,7 @@ def parse(text: str, source: str) -> Arena:
 
 
 def _explain(text: str, raw: Any) -> str:
-    """msgspec's words with the key in front: `robot.wheels: unknown key`."""
+    """Reword an error of msgspec with the key in front, as in `robot.wheels: unknown key`."""
     what, _, where = text.partition(" - at `$")
     where = where.rstrip("`").lstrip(".").removeprefix("$.")
     unknown = re.fullmatch(r"Object contains unknown field `(.*)`", what)

@@ -1,4 +1,4 @@
-"""Many robots in one arena, in one pymunk space: each meets the walls, none meets another."""
+"""Physics of many robots in one pymunk space: they collide with walls, but not with each other."""
 
 import numpy as np
 import pymunk
@@ -25,7 +25,7 @@ class BatchPhysics:
     Parameters
     ----------
     arena : the world.
-    poses : where they start, at rest.
+    poses : the poses at which the robots start, at rest.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class BatchPhysics:
         self._mass, self._moment = bodies[0].mass, bodies[0].moment
         self._ids = np.array([body.id for body in bodies], np.uintp)
         self._order = np.argsort(self._ids)
-        self._seen, self._felt, self._told = Buffer(), Buffer(), Buffer()  # pymunk frees none: made once, used again
+        self._seen, self._felt, self._told = Buffer(), Buffer(), Buffer()  # reused, because pymunk never frees a buffer
         self.poses = np.array(poses, dtype=float)
         self.front = self.rear = np.zeros(self._count, bool)
 
@@ -104,7 +104,7 @@ class BatchPhysics:
         self.poses = poses
 
     def _bring_back(self, touched: np.ndarray, before: np.ndarray, poses: np.ndarray) -> None:
-        """Undo the last substep of those whom a contact has pushed too deep or too far, in `poses` too."""
+        """Undo the last substep of robots that a contact pushed too deep or too far, and update `poses`."""
         rows = np.flatnonzero(touched)
         step = poses[rows] - before[rows]
         step[:, 2] -= 2 * np.pi * np.round(step[:, 2] / (2 * np.pi))
@@ -124,7 +124,7 @@ class BatchPhysics:
         return np.frombuffer(self._seen.float_buf()).reshape(-1, 3)[: self._count].copy()
 
     def _feel(self, poses: np.ndarray) -> None:
-        """Note how deep each is in contact, and who was stopped, in front or at the rear, in the last substep."""
+        """Note each robot's overlap, and whether its front or rear was stopped, in the last substep."""
         self._depth[:] = -1.0
         self._felt.clear()
         get_space_arbiters(self._space, _TOUCH, self._felt)
@@ -138,7 +138,7 @@ class BatchPhysics:
         row = np.where(mine[:, 0], rows[:, 0], rows[:, 1])
         points, there = floats[:, 2:].reshape(-1, 2, 3), np.arange(2) < ids[:, 2:]  # x, y, distance
         np.maximum.at(self._depth, row, np.where(there, np.maximum(-points[:, :, 2], 0.0), -1.0).max(axis=1))
-        pressed = (floats[:, 0] != 0) | (floats[:, 1] != 0)  # else beside a wall, or leaving it
+        pressed = (floats[:, 0] != 0) | (floats[:, 1] != 0)  # an impulse: the robot is not just beside a wall
         if not pressed.any():
             return
         row, points, there = row[pressed], points[pressed], there[pressed]

@@ -14,7 +14,7 @@ from phototaxis_sim.batch_physics import BatchPhysics
 from phototaxis_sim.physics import Physics, Pose
 
 MAX_ROBOTS_PER_SPACE = 256
-"""Robots that share a pymunk space: they overlap without touching, which its index pays for."""
+"""Most robots that share a pymunk space. They do not collide, but overlapping boxes slow the spatial index."""
 
 
 class BatchSimulation:
@@ -28,7 +28,7 @@ class BatchSimulation:
     poses : (N, 3) x and y in m, heading in rad.
     front, rear : (N,) bool, contacts of the last control period.
     episode : (N,) count of each robot's episodes.
-    state : the present tick as it is published, after `advance`; `driver` is filled in by whoever keeps the seat.
+    state : the present tick as it is published, after `advance`; `Steps` fills in `driver`.
     outcomes : whether the light was reached, for each episode that ended in the last `advance`.
     ended : the first robot's episode that ended in the last `advance`, or None.
     """
@@ -63,7 +63,7 @@ class BatchSimulation:
 
     @property
     def finished(self) -> bool:
-        """Whether the last epoch has been made."""
+        """Whether the last epoch is done."""
         return 0 < self.world.epochs <= self.epoch
 
     def anew(self, seed: int, run: str) -> "BatchSimulation":
@@ -73,7 +73,7 @@ class BatchSimulation:
     def advance(self, left: bytes | float, right: bytes | float, author: str, end: bytes | str = b"") -> BatchState:
         """Hold the commands for one control period; robots whose episode ends are placed anew instead.
 
-        Columns as in `BatchCommand`; one number is for all, and so is one of the words for an end.
+        Columns as in `BatchCommand`; one number, or one word of `ENDS`, applies to all robots.
 
         Raises
         ------
@@ -98,7 +98,7 @@ class BatchSimulation:
         )  # fmt: skip
 
     def snapshot(self, recent: list[bool], driver: str) -> None:
-        """Nothing: a run of many robots cannot be continued."""
+        """Return None: a run of many robots cannot be continued."""
 
     def check(self, command: Any) -> None:
         """Raise Refused when a column is not of this many robots, or a command is out of range."""
@@ -109,12 +109,12 @@ class BatchSimulation:
         robots = self.world.robots
         motors = np.stack([self._column(left), self._column(right)])
         ends = np.full(robots, ENDS.index(end), FLAG) if isinstance(end, str) else unpack(end, robots, kind=FLAG)
-        if not (np.abs(motors) <= 1).all() or (ends >= len(ENDS)).any():  # NaN is not within either
+        if not (np.abs(motors) <= 1).all() or (ends >= len(ENDS)).any():  # written so that NaN is refused too
             raise Refused("value: a command out of range")
         return motors, ends
 
     def drive(self, motors: np.ndarray, ends: np.ndarray) -> None:
-        """The same with arrays, motors (2, N) and ends (N,), and without a new `state`."""
+        """Do what `advance` does with arrays, motors (2, N) and ends (N,), but make no new `state`."""
         over = np.flatnonzero(ends)
         motors = self._motors = np.where(ends > 0, 0.0, motors)
         for group, batch in zip(self._groups, self._batches, strict=True):

@@ -10,7 +10,7 @@ _MAX_CELLS = 4096
 
 
 def too_dim(arena: Arena) -> str | None:
-    """That no light can ever count as reached, in one line; None where one can."""
+    """Return an error line if no light can ever count as reached, else None."""
     noise = arena.sensing.noise
     brightest = (1 + noise) * _brightest(arena, GOAL_LIGHT / (1 + noise))
     if brightest > GOAL_LIGHT:

@@ -1,4 +1,4 @@
-"""How a simulation that was killed continues: from the frames of its journal."""
+"""Restores a simulation that was killed from the frames of its journal."""
 
 import re
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from phototaxis_sim.simulation import Simulation, Snapshot
 
 
 class Entry(msgspec.Struct, array_like=True):
-    """What is applied at one tick; of one robot, what the journal keeps of it."""
+    """The command that is applied at one tick; with one robot also the journal's entry for that tick."""
 
     left: Any
     right: Any
@@ -23,7 +23,7 @@ class Entry(msgspec.Struct, array_like=True):
 
 
 class Continued(NamedTuple):
-    """A run at an episode's first tick, and what was applied since."""
+    """A run at an episode's first tick, and the commands that were applied since."""
 
     simulation: Simulation
     snapshot: Snapshot
@@ -31,7 +31,7 @@ class Continued(NamedTuple):
 
 
 def open_journal(journal: Journal, fresh: Simulation) -> Continued | None:
-    """What the journal holds of this run, and go on with it; where it holds nothing, begin it.
+    """Read this run from the journal and keep the journal open for it; begin a new journal if it has no such run.
 
     Raises
     ------

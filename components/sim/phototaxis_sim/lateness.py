@@ -1,10 +1,10 @@
-"""In real time: how many ticks passed without a command, which part was too slow, and when that matters."""
+"""Counts the ticks that passed without a command in real time, and tells which component is too slow."""
 
 from collections import deque
 
 RECENT_TICKS = 100
 MIN_LATE_TICKS = 10
-"""So many late ones among the recent ticks are worth a word."""
+"""Late ticks among the recent ones from which on a warning is given."""
 
 
 class Lateness:
@@ -12,8 +12,8 @@ class Lateness:
 
     Attributes
     ----------
-    ticks : how many there were.
-    unsensed : in how many of them the readings had not come either: the sensors were too slow.
+    ticks : number of late ticks.
+    unsensed : number of late ticks whose readings had not come either, so that the sensors were too slow.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class Lateness:
         self._recent.append("agent" if sensed else "sensors")
 
     def told(self, agent: str, sensors: str) -> str:
-        """Which part is too slow now, and how often, for people; "" while it does not matter."""
+        """A line that says which component is too slow and how often; "" while few ticks are late."""
         counts = {agent: self._recent.count("agent"), sensors: self._recent.count("sensors")}
         late = sum(counts.values())
         if late < MIN_LATE_TICKS:

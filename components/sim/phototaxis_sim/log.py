@@ -1,4 +1,4 @@
-"""What the simulation wants recorded: a row a tick, and the message that a chunk of rows becomes."""
+"""Makes the simulation's log: one row for each tick, and a message from a chunk of rows."""
 
 from collections.abc import Callable
 from typing import Any

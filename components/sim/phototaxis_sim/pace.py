@@ -1,11 +1,11 @@
-"""When the next tick may come: in lockstep with the answers, or by the clock."""
+"""Decides when a tick ends: when its command comes (lockstep), or by the clock (real time)."""
 
 STOP_AFTER_PERIODS = 2.0
 """In real time the motors stop when the newest command is older than this many control periods."""
 
 
 class Pace:
-    """Speed as a rate limit on the one protocol.
+    """Turns the speed of a run into the time at which each tick ends.
 
     speed 0 is lockstep: a tick ends when its command comes. A speed s > 0 ends a tick every
     control_period / s seconds, with the newest command; times are seconds of a monotonic clock.

@@ -1,4 +1,4 @@
-"""What the simulation is doing, and what moves it on: one table."""
+"""The phases of the simulation, and the table of transitions between them."""
 
 from enum import StrEnum
 

@@ -1,9 +1,9 @@
-"""A differential-drive robot among walls: pymunk does the collisions.
+"""Moves a differential-drive robot among walls; pymunk resolves the collisions.
 
 The robot is overdamped: in each physics step the solver starts from the velocity that the wheels ask
 for and takes away what the contacts forbid, so that the body is stopped by a wall and slides along it.
-A physics step that would take the body through something thin is divided into substeps, and where the
-solver pushes it further than it may, between two walls for instance, the substep is not made.
+A physics step that could take the body through a thin wall is divided into substeps. A substep is undone if the
+solver pushes the body too far in it, for instance between two walls.
 """
 
 import math
@@ -33,7 +33,7 @@ class Pose(NamedTuple):
 
 
 class DriveResult(NamedTuple):
-    """Where a control period has led."""
+    """The robot's pose, speeds and contacts after a control period."""
 
     pose: Pose
     speed: float
@@ -79,7 +79,7 @@ def undo_substep(body: pymunk.Body, position: tuple[float, float], angle: float,
 
 
 def bring_to_rest(body: pymunk.Body, dt: float) -> None:
-    """Bring a body to rest, with what the solver has in store to push it out of a wall."""
+    """Bring a body to rest, and clear the velocity that the solver keeps to push it out of a wall."""
     body.velocity, body.angular_velocity = (0, 0), 0
     pymunk.Body.update_position(body, dt)
 
@@ -139,7 +139,7 @@ class Physics:
         Raises
         ------
         UserError
-            when 10,000 tries found none.
+            when 10,000 tries find none.
         """
         return self.sample(rng, 1)[0][0]
 
@@ -249,7 +249,7 @@ class Physics:
         points = arbiter.contact_point_set.points
         for point in points:
             self._depth = max(self._depth, -point.distance, 0.0)
-        if not arbiter.total_impulse:  # beside a wall, or leaving it: nothing presses
+        if not arbiter.total_impulse:  # no impulse: the robot moves along a wall or away from it
             return
         for point in points:
             if self._body.world_to_local(point.point_a).x >= 0:

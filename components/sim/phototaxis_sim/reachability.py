@@ -1,7 +1,7 @@
-"""The room as a grid: where the robot can get, and whether it could reach a light there.
+"""Divides the room into a grid, and tells from which cells the robot could reach a light.
 
-The robot counts as a disc as wide as its narrower side, so a way that is found may still be too narrow for it;
-that none is found is therefore worth a warning.
+The robot counts as a disc as wide as its narrower side, so a path on the grid may still be too narrow for it;
+but if there is no path, the robot cannot get there.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""How the run is doing, for people: who is there, how fast it goes, what is wrong."""
+"""Makes the status of a run: which components are present, how fast it goes, what is wrong."""
 
 from collections import Counter, deque
 
@@ -13,23 +13,23 @@ from phototaxis_sim.simulated import Simulated
 
 STATUS_EVERY_S = 0.2
 WAITS_AFTER_S = 0.5
-"""After so long without an answer the status says "waiting", and names the part that is late."""
+"""Seconds without an answer after which the status says "waiting" and names the late component."""
 MAX_RECENT = 50
 """Ended episodes whose outcomes count as recent."""
 _NEEDED = ("sensors", "agent")
 
 
 class Report:
-    """Gathers what the status tells.
+    """Collects the contents of the status.
 
     Attributes
     ----------
     alive : "role/id" of every component on the bus.
     refused : how many messages were dropped, by topic and reason.
     recent : whether the last ended episodes reached the light.
-    recorded : the newest word of the recorder.
+    recorded : the newest progress message of the recorder.
     sensed : the newest tick whose readings came; None until there are any.
-    unkept : why the journal is given up; "" while it is not.
+    unkept : why the journal was given up; "" if it was not.
     due_at : when the next status is due.
     """
 
@@ -55,7 +55,7 @@ class Report:
         self.refused[f"{refusal.topic}: {refusal.why.split(':')[0]}"] += 1
 
     def measure(self, now: float, tick: int) -> None:
-        """Note how fast the run goes; a finished one is not measured any more."""
+        """Measure the speed of the run, unless it is finished."""
         if now - self._rate_at >= 1.0:
             self._rate = (tick - self._rate_tick) / (now - self._rate_at) if self._rate_at else 0.0
             self._rate_at, self._rate_tick = now, tick
@@ -74,7 +74,7 @@ class Report:
         return f"at {status.speed:g} × real time {status.too_slow}" if status.too_slow and not was else ""
 
     def waits_for(self, phase: Phase, driver: str, answered: bool, overdue: bool) -> str:
-        """Whom the run waits for; "" when it goes on."""
+        """Which component or command the run waits for, in words; "" while it goes on."""
         if phase in (Phase.PAUSED, Phase.ENDING):
             return f"the command of {driver}" if driver and not answered else ""
         if phase is Phase.FINISHED:

@@ -1,10 +1,10 @@
-"""The one seat: who may drive, who drives next, and who stands by."""
+"""The driver's seat: which agent drives, which takes over next, and which stand by."""
 
 from phototaxis.wire.codec import Refused
 from phototaxis.wire.messages import SeatChange, SeatChangeReason
 
 MAX_HISTORY = 50
-"""Holders of the seat that are remembered."""
+"""Most changes of the seat in `Seat.history`."""
 
 
 class Seat:
@@ -17,11 +17,11 @@ class Seat:
 
     Attributes
     ----------
-    driver : who holds the seat; "" for nobody.
-    standbys : who takes it when the driver vanishes, in this order. A new driver has none: who stood by the one
-        before may not know what this one knows, and asks again.
-    reserved : who takes it over, and from which tick on.
-    history : who held it since when, the newest last.
+    driver : the agent that holds the seat; "" for none.
+    standbys : the agents that take the seat when the driver vanishes, in this order. A new driver begins with none,
+        because an agent that stood by for another one may not know what this one knows; it asks again.
+    reserved : the agents that take the seat over, and each one's first possible tick.
+    history : the changes of the seat, the newest last.
     """
 
     def __init__(self, heir: str = ""):
@@ -36,12 +36,12 @@ class Seat:
         return [*sorted(self.reserved, key=self.reserved.__getitem__), *self.standbys]
 
     def claim(self, agent: str, tick: int) -> None:
-        """Sit down if the seat is free.
+        """Give an agent the seat if it is free.
 
         Raises
         ------
         Refused
-            when it is taken, or kept for somebody else.
+            when the seat is taken, or kept for another agent.
         """
         _named(agent)
         if self.driver == agent:
@@ -53,13 +53,13 @@ class Seat:
         self._give(agent, tick, "claimed")
 
     def reserve(self, agent: str, at: int) -> None:
-        """Take the seat over at the first tick boundary from tick `at` on."""
+        """Let an agent take the seat over at the first tick boundary from tick `at` on."""
         _named(agent)
         if agent != self.driver:
             self.reserved[agent] = at
 
     def stand_by(self, agent: str, tick: int) -> None:
-        """Drive when nobody else does."""
+        """Queue an agent that drives when no other agent does."""
         _named(agent)
         if agent != self.driver and agent not in self.standbys:
             self.standbys.append(agent)
@@ -67,7 +67,7 @@ class Seat:
                 self.vacate(tick)
 
     def boundary(self, tick: int) -> bool:
-        """Between two ticks: hand over to who has reserved `tick` or an earlier one; whether the driver changed."""
+        """Hand over to an agent that has reserved `tick` or an earlier one; return whether the driver changed."""
         agent = self.next(tick)
         if agent not in self.reserved:
             return False
@@ -75,7 +75,7 @@ class Seat:
         return True
 
     def leave(self, agent: str, tick: int) -> bool:
-        """Free the seat if `agent` holds it, and let the next one sit down; whether it held it."""
+        """Free the seat if `agent` holds it, and seat the next agent; return whether `agent` held it."""
         self.reserved.pop(agent, None)
         if agent in self.standbys:
             self.standbys.remove(agent)
@@ -85,25 +85,25 @@ class Seat:
         return True
 
     def release(self, agent: str, tick: int) -> None:
-        """Leave the seat on purpose.
+        """Let an agent give the seat back by request.
 
         Raises
         ------
         Refused
-            when it is somebody else's.
+            when another agent holds the seat.
         """
         if not self.leave(agent, tick):
             raise Refused(f"{agent} does not hold the seat")
 
     def next(self, tick: int) -> str:
-        """Who would sit down if the seat were vacated now; "" for nobody."""
+        """The agent that would get the seat if it were vacated now; "" for none."""
         due = [agent for agent, at in self.reserved.items() if at <= tick]
         if due:
             return min(due, key=self.reserved.__getitem__)
         return self.standbys[0] if self.standbys and not self.heir else ""
 
     def vacate(self, tick: int) -> bool:
-        """Take the seat from its holder and let the next one sit down, if there is one; whether there was."""
+        """Take the seat from its holder and give it to the next agent; return whether there was one."""
         self.driver = ""
         agent = self.next(tick)
         if agent:

@@ -30,7 +30,7 @@ def serve(
     UserError
         when the journal is not one of a simulation.
     Unavailable
-        when it cannot be begun, or was given up before the simulation died.
+        when the journal cannot be begun, or was given up before the simulation died.
     """
     found = open_journal(journal, simulation) if journal is not None and isinstance(simulation, Simulation) else None
     stepper = Stepper(simulation, pace, partial(secrets.token_hex, 2), found, driver_timeout)

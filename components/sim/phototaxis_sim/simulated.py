@@ -1,4 +1,4 @@
-"""What the step protocol needs of a simulation, of one robot or of many."""
+"""The interface through which the step protocol drives a simulation of one robot or of many."""
 
 from typing import Any, Protocol
 

@@ -1,4 +1,4 @@
-"""A run: ticks, episodes and epochs over the physics. Knows nothing of the bus or of wall-clock time."""
+"""Simulates a run of one robot, with its ticks, episodes and epochs, without the bus or wall-clock time."""
 
 import hashlib
 import struct
@@ -31,7 +31,7 @@ class Snapshot(Struct):
     recent: list[bool]
     """Whether the last ended episodes reached the light."""
     driver: str
-    """Who held the seat."""
+    """Name of the agent that held the seat."""
     arena: str = ""
     """`Arena.digest`."""
 
@@ -50,7 +50,7 @@ class Simulation:
     Attributes
     ----------
     state : State
-        the present tick; `driver` is filled in by whoever keeps the seat.
+        the present tick; `Steps` fills in `driver`.
     ended : EndedEpisode or None
         the episode that ended in the last `advance`.
     digest : of the arena.
@@ -97,7 +97,7 @@ class Simulation:
         Raises
         ------
         UserError
-            when the light was reached without a step in the last 1,000 episodes: so it would go on for ever.
+            when the light was reached without a step in the last 1,000 episodes, which would go on forever.
         """
         self.ended = None
         self._tick += 1
@@ -126,7 +126,7 @@ class Simulation:
         return self.state
 
     def snapshot(self, recent: list[bool], driver: str) -> Snapshot:
-        """What `restore` needs to begin the present episode again; only at its first tick."""
+        """Make what `restore` needs to begin the present episode again; call it only at the first tick."""
         return Snapshot(
             self.world.run,
             self.world.seed,

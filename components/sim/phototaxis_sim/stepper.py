@@ -16,9 +16,9 @@ from phototaxis_sim.simulated import Simulated
 from phototaxis_sim.steps import Steps
 
 ANSWERED_WITHIN_S = 2.0
-"""The driver gets so long to answer the last tick of a simulation that is asked to stop."""
+"""Seconds for the driver's last answer after the simulation is asked to stop."""
 HEIR_WITHIN_S = 3.0
-"""A continued simulation keeps the seat so long for its former driver."""
+"""Seconds for which a continued simulation keeps the seat for its former driver."""
 
 
 class Stepper:

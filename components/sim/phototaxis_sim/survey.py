@@ -1,4 +1,4 @@
-"""A look at an arena before it is used: what can only be suspected, by placing the robot at random and looking."""
+"""Finds suspicious properties of an arena before it is used, by placing the robot at random."""
 
 from collections.abc import Iterator
 
@@ -18,7 +18,7 @@ _NEARLY_ALWAYS, _OFTEN, _SELDOM = 0.95, 0.5, 0.01
 
 
 def survey(arena: Arena) -> list[str]:
-    """What may be wrong with an arena, a line each.
+    """Return what may be wrong with an arena, one line each.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def _outside(arena: Arena) -> Iterator[str]:
 
 
 def _cut_off(arena: Arena, starts: list[Pose]) -> list[str]:
-    """Whether there are places from which every light seems to be out of reach."""
+    """Warn if there are placements from which no light seems reachable."""
     if len(list(solids(arena))) > _MAX_SOLIDS:
         return []
     grid = ReachabilityGrid(arena)

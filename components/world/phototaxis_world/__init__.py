@@ -1,1 +1,1 @@
-"""What physics and rays must have in common and that needs more than NumPy: the room's shapes in pymunk."""
+"""The room's shapes in pymunk, which the simulation and the sensors share."""

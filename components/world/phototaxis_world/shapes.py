@@ -1,11 +1,11 @@
-"""The arena's static shapes for pymunk, the same for physics and rays (needs the extra world)."""
+"""Makes the arena's static pymunk shapes for physics and for rays (needs the extra `world`)."""
 
 import pymunk
 from phototaxis.geometry.arena import Arena
 
 
 def static_shapes(arena: Arena, body: pymunk.Body) -> list[pymunk.Shape]:
-    """Everything that does not move: the room, polygons, walls and discs."""
+    """Make the shapes of all that does not move: the room, polygons, walls and discs."""
     return [
         *(pymunk.Poly(body, polygon.corners) for polygon in (*arena.boundary(), *arena.polygons)),
         *(pymunk.Segment(body, wall.start, wall.end, wall.thickness / 2) for wall in arena.walls),

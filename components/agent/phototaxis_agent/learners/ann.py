@@ -13,7 +13,7 @@ from phototaxis_agent.threads import one_thread
 
 REWARD_POINTS = (-2.0, 0.0, 2.0, 3.0)
 TARGET_POINTS = (0.0, 0.5, 0.75, 1.0)
-"""What the paper's reinforcement values become for a net whose output is in 0..1; linear in between."""
+"""Targets to which the paper's rewards are mapped for a net with outputs in 0..1; linear in between."""
 
 
 class Ann(Learner):

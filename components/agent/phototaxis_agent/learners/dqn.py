@@ -14,7 +14,7 @@ from phototaxis_agent.threads import one_thread
 
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
-    """Of the network and its replay."""
+    """Hyperparameters of the network and its replay buffer."""
 
     gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.6
     """discount factor γ of equation 1"""
@@ -29,7 +29,7 @@ class Hyperparameters(Struct, frozen=True, kw_only=True):
     gradient_steps: Annotated[int, Meta(ge=1, le=100)] = 2
     """steps of Adam, each with a batch of its own, after each learning step"""
     buffer_size: Annotated[int, Meta(ge=1, le=1_000_000)] = 10_000
-    """experiences that are kept; the oldest make room"""
+    """experiences in the replay buffer; new ones replace the oldest"""
     target_update_interval: Annotated[int, Meta(ge=1)] = 50
     """steps after which the target net becomes a copy of the net"""
 
@@ -106,7 +106,7 @@ class Dqn(Learner):
         return error
 
     def _keep(self, *experience: Any) -> int:
-        """Put an experience in the place of the oldest; its row."""
+        """Store an experience in place of the oldest, and return its row."""
         row = self._kept % self._options.buffer_size
         for column, value in zip(self._replay.values(), experience, strict=True):
             column[row] = value

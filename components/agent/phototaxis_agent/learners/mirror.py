@@ -1,8 +1,8 @@
 """The learner that needs the fewest steps: least-squares SARSA(λ) on a table folded along the robot's symmetry.
 
 Left and right are alike: a state and action share their entry with their mirror image, so every experience
-counts twice. And instead of creeping towards each target by a learning rate, the table is at every step the
-exact solution of all that was experienced so far: the recursive least squares of Xu, He and Hu (2002) after
+counts twice. There is no learning rate: after every step the table is the exact least-squares solution for
+all experience so far: the recursive least squares of Xu, He and Hu (2002) after
 Bradtke and Barto (1996), with eligibility traces, which soften that percepts are not Markov states. The
 reward scheme "potential" pays for approach alone.
 """
@@ -21,7 +21,7 @@ MIN_TRACE = 0.01
 
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
-    """Of the folded table."""
+    """Hyperparameters of the folded table."""
 
     gamma: Annotated[float, Meta(ge=0, lt=1)] = 0.8
     """discount factor γ of equation 1"""
@@ -30,7 +30,7 @@ class Hyperparameters(Struct, frozen=True, kw_only=True):
     initial_value: Annotated[float, Meta(ge=-100, le=100)] = 0.3
     """value of an entry without experience; optimism makes the robot try everything"""
     ridge: Annotated[float, Meta(gt=0, le=1000)] = 0.5
-    """how many experiences the first value counts for"""
+    """weight of the initial value, as a number of experiences"""
     context: Literal["none", "last"] = "last"
     """none: the percept alone is the state; last: also the last action and whether it got brighter"""
 

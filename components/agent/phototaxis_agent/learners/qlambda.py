@@ -14,10 +14,10 @@ MIN_TRACE = 0.01
 
 
 class Hyperparameters(qtable.Hyperparameters, frozen=True, kw_only=True):
-    """Of the table and its traces."""
+    """Hyperparameters of the table and its traces."""
 
     trace_decay: Annotated[float, Meta(ge=0, le=1)] = 0.8
-    """trace decay λ: 0 is plain Q-learning; 1 corrects the whole way that led here"""
+    """trace decay λ: 0 is plain Q-learning; 1 corrects all earlier steps of the episode alike"""
 
 
 class QLambda(qtable.QTable):

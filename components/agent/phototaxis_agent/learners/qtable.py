@@ -11,7 +11,7 @@ from phototaxis_agent.learner import Learner, Transition, annealed, discrete, st
 
 
 class Hyperparameters(Struct, frozen=True, kw_only=True):
-    """Of the table."""
+    """Hyperparameters of the table."""
 
     learning_rate: Annotated[float, Meta(gt=0, le=1)] = 0.16
     """learning rate α of equation 1 at the first epoch; it falls geometrically to `learning_rate_end`"""

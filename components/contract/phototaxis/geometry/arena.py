@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta, Struct, field
 
 MAX_NUMBER = 10_000
-"""No length, time or rate is larger (NaN and infinity are not either)."""
+"""Upper bound of every length, time and rate; it also excludes NaN and infinity."""
 Coordinate = Annotated[float, Meta(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 Point = tuple[Coordinate, Coordinate]
 Positive = Annotated[float, Meta(gt=0, le=MAX_NUMBER)]
@@ -30,7 +30,7 @@ class Wall(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Polygon(Struct, forbid_unknown_fields=True, frozen=True):
-    """A convex obstacle, whose corners may turn either way."""
+    """A convex obstacle, with its corners in clockwise or anticlockwise order."""
 
     corners: Annotated[list[Point], Meta(min_length=3, max_length=64)]
     """The 3 to 64 corners (x, y) in their order around the obstacle, in metres in the room's frame."""
@@ -76,7 +76,7 @@ def pioneer_sonars() -> list[Sonar]:
 
 
 class Robot(Struct, forbid_unknown_fields=True, frozen=True):
-    """A differential-drive robot with a rectangular body, at full scale ±1 of its wheel commands."""
+    """A differential-drive robot with a rectangular body; its wheel commands range from −1 to 1."""
 
     length: Positive = 0.45
     """Size of the body from front to rear, in metres, at least 0.01."""
@@ -137,7 +137,7 @@ class Placement(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Arena(Struct, forbid_unknown_fields=True, frozen=True):
-    """A world as its TOML file describes it; one that breaks a rule (`phototaxis.geometry.rules`) cannot be made."""
+    """A world as its TOML file describes it; ValueError if it breaks a rule of `phototaxis.geometry.rules`."""
 
     name: Annotated[str, Meta(min_length=1, max_length=64)]
     """Name of the arena, from 1 to 64 printable characters."""
@@ -163,7 +163,7 @@ class Arena(Struct, forbid_unknown_fields=True, frozen=True):
     """Where an episode may start."""
 
     def __post_init__(self) -> None:
-        from phototaxis.geometry import rules  # needs NumPy, which messages do without
+        from phototaxis.geometry import rules  # imported here because messages must not need NumPy
 
         rules.check(self)
 
@@ -180,7 +180,7 @@ class Arena(Struct, forbid_unknown_fields=True, frozen=True):
 
     @property
     def digest(self) -> str:
-        """What the world is, 16 hexadecimal digits: equal in arenas that differ in `name` and `about` alone."""
+        """A digest of the world, 16 hexadecimal digits; `name` and `about` have no influence on it."""
         world = {key: value for key, value in msgspec.structs.asdict(self).items() if key not in ("name", "about")}
         return hashlib.blake2b(msgspec.json.encode(world), digest_size=8).hexdigest()
 

@@ -1,7 +1,7 @@
-"""What is well-formed and yet no world: each rule names the key, what is expected there, and what was found.
+"""Rules that an arena must obey beyond its types; an error names the key, what is expected and what was found.
 
-Every `Arena` obeys them, wherever it comes from: a file, a message, a program. What can only be suspected is not
-said here but by the simulation, which can place a robot and look.
+`Arena` checks them whenever one is made: from a file, a message or a program. Suspicious but valid arenas are found
+by the simulation, which can place a robot and try.
 """
 
 import math
@@ -16,11 +16,11 @@ from phototaxis.geometry.solids import distance, extent, solids, thickness
 from phototaxis.geometry.substeps import max_overlap, max_speed, substeps, thinnest
 
 MIN_THICKNESS_M = 0.002
-"""What an obstacle must measure, m: twice the depth at which the solver leaves a contact."""
+"""Least thickness of an obstacle, m: twice the overlap that the solver leaves in a contact."""
 MIN_ROBOT_SIDE_M = 0.01
-"""What the robot must measure, m."""
+"""Least length and width of the robot, m."""
 MAX_SUBSTEPS = 10_000
-"""Steps of the solver in one control period."""
+"""Most solver steps in one control period."""
 
 
 def check(arena: Arena) -> None:

@@ -1,6 +1,6 @@
-"""What light sensors see, for many robots at once, in NumPy: occlusion by obstacles and by the robot's own body.
+"""Computes what the light sensors of many robots see, in NumPy, with occlusion by obstacles and by the own body.
 
-The built-in sensors of many robots use it, and the check whether an arena can be solved at all.
+The batch sensors use it, and the check whether the robot can reach the light in an arena.
 """
 
 import math
@@ -10,11 +10,11 @@ import numpy as np
 from phototaxis.geometry.arena import Arena, Light, Sensing
 
 LAMP_CLEARANCE_M = 0.1
-"""The line of sight stops this far from the light, m, so that a lamp may stand in a socket."""
+"""The line of sight stops this far from the light, m, so that a light may touch or enter an obstacle a little."""
 
 
 def falloff(law: Sensing, distance: np.ndarray) -> np.ndarray:
-    """What a light of brightness 1 gives at a distance in m."""
+    """The reading that a light of brightness 1 gives at a distance in m."""
     if law.light_law == "linear":
         return np.maximum(1 - distance / law.light_range, 0.0)
     return 1 / np.maximum(distance, 1.0) ** 2
@@ -35,10 +35,10 @@ class LightSensors:
         return np.minimum(total, 1.0)
 
     def sight(self, light: Light, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """One light as each robot's two sensors see it, (2, N) each.
+        """How each robot's two sensors see one light: four arrays (2, N).
 
-        Its place relative to the sensor (east and north, m), its distance, and whether neither a wall nor the
-        robot's own body is in between.
+        They are the light's place relative to the sensor (east and north, m), its distance (m), and whether it is
+        visible: neither an obstacle nor the robot's own body is in between.
         """
         x, y, heading = poses.T
         cos, sin = np.cos(heading), np.sin(heading)
@@ -82,7 +82,7 @@ def slab(start: np.ndarray, step: np.ndarray, low: float, high: float) -> tuple[
 
 
 class Obstacles:
-    """What a ray can hit, as convex outlines and discs; a ray that starts inside one hits it at once."""
+    """Everything that a ray can hit, as convex outlines and discs; a ray that starts inside one hits it at 0."""
 
     def __init__(self, arena: Arena):
         self._size = arena.size
@@ -97,7 +97,7 @@ class Obstacles:
         self._outlines = [half_planes(corners) for corners in outlines]
 
     def hit(self, start: tuple[np.ndarray, np.ndarray], ray: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Where along each ray (0 its start, 1 its end) it first hits; 1 when it hits nothing."""
+        """Where each ray first hits an obstacle, from 0 (its start) to 1 (its end); 1 if it hits nothing."""
         (x, y), (dx, dy) = start, ray
         first = np.ones(x.shape)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""The arena's obstacles as solids: how thick each is, where it is, and how far points are from it."""
+"""Measures the arena's obstacles: their thickness, their extent, and the distance of points from them."""
 
 import math
 from collections.abc import Iterator
@@ -11,14 +11,14 @@ Solid = Wall | Polygon | Disc
 
 
 def solids(arena: Arena) -> Iterator[tuple[str, Solid]]:
-    """Every obstacle in the room with its key: `walls[0]`."""
+    """Every obstacle in the room, with its key, such as `walls[0]`."""
     for kind in ("walls", "polygons", "discs"):
         for index, solid in enumerate(getattr(arena, kind)):
             yield f"{kind}[{index}]", solid
 
 
 def thickness(solid: Solid) -> float:
-    """The smallest distance of two parallel lines that have the obstacle between them, m."""
+    """The smallest distance between two parallel lines that enclose the obstacle, m."""
     if isinstance(solid, Wall):
         return solid.thickness
     if isinstance(solid, Disc):
@@ -31,7 +31,7 @@ def thickness(solid: Solid) -> float:
 
 
 def extent(solid: Solid) -> tuple[float, float, float, float]:
-    """Least x and y, greatest x and y, m."""
+    """The bounding box: least x, least y, greatest x, greatest y, m."""
     if isinstance(solid, Wall):
         points, beyond = [solid.start, solid.end], solid.thickness / 2
     elif isinstance(solid, Disc):
@@ -43,7 +43,7 @@ def extent(solid: Solid) -> tuple[float, float, float, float]:
 
 
 def distance(solid: Solid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """How far points are from an obstacle, m; negative inside, by how deep. `x` and `y` broadcast."""
+    """How far points are from an obstacle, m; inside it, minus the depth. `x` and `y` broadcast."""
     if isinstance(solid, Wall):
         return _from_line(x, y, solid.start, solid.end) - solid.thickness / 2
     if isinstance(solid, Disc):
@@ -61,7 +61,7 @@ def _sides(polygon: Polygon) -> list[tuple[Point, Point]]:
 
 
 def _from_line(x: np.ndarray, y: np.ndarray, start: Point, end: Point) -> np.ndarray:
-    """The distance of points from the straight line between two others, m."""
+    """The distance of points from a line segment, m."""
     (ax, ay), (bx, by) = start, end
     dx, dy = bx - ax, by - ay
     along = np.clip(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy), 0.0, 1.0)

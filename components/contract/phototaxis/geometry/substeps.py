@@ -1,7 +1,7 @@
-"""How far a robot may move between two looks at its contacts, so that it passes through nothing.
+"""Limits how far a robot moves between two collision checks, so that it cannot pass through an obstacle.
 
-Physics moves a body and then looks what it overlaps. A body that overlaps an obstacle by no more than `max_overlap`
-keeps its middle on the side it came from, and none of its points, a light sensor among them, comes out behind a wall.
+The solver moves a body and then checks what it overlaps. While the overlap is at most `max_overlap`, the body's
+middle stays on its side of a wall, and no point of the body, such as a light sensor, reaches the other side.
 """
 
 import math
@@ -10,11 +10,11 @@ from phototaxis.geometry.arena import Arena
 from phototaxis.geometry.solids import solids, thickness
 
 _SHARE = 0.6
-"""Of half the body's narrower side: what it may overlap an obstacle by."""
+"""Largest overlap with an obstacle, as a share of half the body's narrower side."""
 
 
 def thinnest(arena: Arena) -> tuple[float, str]:
-    """The thickness of the thinnest obstacle, m, and its key; infinite without any."""
+    """The thickness of the thinnest obstacle, m, and its key; infinity and "" without obstacles."""
     return min(((thickness(solid), key) for key, solid in solids(arena)), default=(math.inf, ""))
 
 
@@ -24,16 +24,16 @@ def max_overlap(arena: Arena) -> float:
 
 
 def max_move(arena: Arena) -> float:
-    """How far the solver may move any point of the robot at once, m: less than what it never overlaps is wide."""
+    """Largest move of any point of the robot in one step, m: twice what `_SHARE` leaves of half its narrower side."""
     return 2 * (1 - _SHARE) * min(arena.robot.length, arena.robot.width) / 2
 
 
 def max_speed(arena: Arena) -> float:
-    """The highest speed of any point of the robot, m/s: all of it straight on, or a corner while it turns."""
+    """The highest speed of any point of the robot, m/s: of all points ahead, or of a corner in a turn on the spot."""
     robot = arena.robot
     return max(robot.speed, robot.turn * math.hypot(robot.length, robot.width) / 2)
 
 
 def substeps(arena: Arena) -> int:
-    """Into how many substeps a physics step is divided, so that no point moves further than `max_overlap` in one."""
+    """Number of substeps in a physics step, so that no point moves further than `max_overlap` in one."""
     return max(math.ceil(max_speed(arena) * arena.motion.physics_step / max_overlap(arena) - 1e-9), 1)

@@ -1,4 +1,5 @@
-"""What a Zenoh configuration opens to strangers: what it leaves out is shut, what it asks for needs a guard."""
+"""Finds what a Zenoh configuration opens to other machines. Settings it leaves out are closed; those it sets need
+authentication."""
 
 import ipaddress
 from collections.abc import Iterator
@@ -10,7 +11,7 @@ import zenoh
 from phototaxis.runtime.errors import UserError
 
 DISCOVERY = ("scouting/multicast/enabled", "scouting/gossip/enabled")
-"""How strangers find a process and are dialled by it, whatever it listens on. Zenoh has both on by default."""
+"""Settings by which other machines discover a process and get connected to it. Zenoh enables both by default."""
 UNICAST_PROTOCOLS = ("tcp", "udp", "tls", "quic", "ws")
 """Protocols that listen on an address."""
 HARMLESS_SECTIONS = frozenset(
@@ -20,7 +21,7 @@ HARMLESS_SECTIONS = frozenset(
         *("downsampling", "low_pass_filter", "queries_default_timeout", "stats"),
     )
 )
-"""Sections of a configuration that open nothing, apart from what `exposures` looks into."""
+"""Sections of a configuration that open nothing beyond the settings that `exposures` checks."""
 
 
 class Exposure(NamedTuple):
@@ -28,13 +29,13 @@ class Exposure(NamedTuple):
 
     what: str
     instead: str
-    """What to do in place of it."""
+    """What the user can do instead."""
     guarded: bool
     """Whether clients must authenticate, and the access control limits what each of them may do."""
 
 
 def get(config: zenoh.Config, key: str) -> Any:
-    """A value of a configuration; None where there is none."""
+    """A value of a configuration; None if it is not set."""
     try:
         return msgspec.json.decode(config.get_json(key))
     except (zenoh.ZError, msgspec.DecodeError):
@@ -42,20 +43,20 @@ def get(config: zenoh.Config, key: str) -> Any:
 
 
 def put(config: Any, key: str, value: Any) -> None:
-    """Set a value of a configuration, whose stubs do not say that this returns nothing."""
+    """Set a value of a configuration. (`Any`: Zenoh's stubs lack the return type.)"""
     config.insert_json5(key, msgspec.json.encode(value).decode())
 
 
 def endpoints(config: zenoh.Config, what: str) -> list[Any]:
-    """The endpoints to "listen" on (texts) or to "connect" to, in the mode that the configuration has."""
+    """The endpoints for `what`, "listen" or "connect", in the configuration's mode."""
     found: list[Any] | dict[str, list[Any] | None] = get(config, f"{what}/endpoints") or []
     return found.get(get(config, "mode") or "peer") or [] if isinstance(found, dict) else found
 
 
 def close_defaults(config: zenoh.Config) -> None:
-    """Set what the configuration leaves out, and what Zenoh would open then, to what opens nothing.
+    """Close everything that Zenoh would open by default and the configuration does not set.
 
-    Shared memory goes off in any case: messages of our size gain nothing by it.
+    Shared memory is always switched off: our messages are too small to gain from it.
     """
     for key in DISCOVERY:
         if get(config, key) is None:
@@ -66,10 +67,10 @@ def close_defaults(config: zenoh.Config) -> None:
 
 
 def exposures(config: zenoh.Config) -> Iterator[Exposure]:
-    """The doors that a configuration asks for.
+    """Everything that a configuration opens to other machines.
 
-    Credentials guard links to an address. They do not guard a multicast group, which has no links, nor a
-    plugin, which is inside already.
+    Credentials guard unicast links. They do not guard a multicast group, which has no links, nor a plugin, which
+    runs inside the process.
     """
     rights = _rights(config)
     passwords = rights and bool(get(config, "transport/auth/usrpwd/dictionary_file"))
@@ -89,11 +90,11 @@ def exposures(config: zenoh.Config) -> Iterator[Exposure]:
     defaults = msgspec.json.decode(str(zenoh.Config()))
     for section, value in msgspec.json.decode(str(config)).items():
         if section not in HARMLESS_SECTIONS and value != defaults.get(section):
-            yield Exposure(f"{section} may open doors of its own", "leave it out", False)
+            yield Exposure(f"{section} may let other machines in", "leave it out", False)
 
 
 def refuse_exposures(config: zenoh.Config, source: str = "") -> None:
-    """Raise UserError for the first open door that nothing guards; `source` names the file."""
+    """Raise UserError for the first unguarded exposure; `source` names the configuration file."""
     for door in exposures(config):
         if not door.guarded:
             raise UserError(
@@ -103,7 +104,7 @@ def refuse_exposures(config: zenoh.Config, source: str = "") -> None:
 
 
 def is_local(endpoint: str) -> bool:
-    """Whether only this machine reaches a listener: a Unix socket, or a loopback address on no named interface."""
+    """Whether only this machine can reach a listener: a Unix socket, or a loopback address on no named interface."""
     protocol, _, rest = endpoint.partition("/")
     if protocol == "unixsock-stream":
         return True
@@ -118,7 +119,7 @@ def _host(endpoint: str) -> str:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches what listens on that name or address."""
+    """Whether only this machine can reach a listener on that name or address."""
     address = _address(host)
     return host == "localhost" if address is None else address.is_loopback
 
@@ -129,7 +130,7 @@ def _multicast(endpoint: str) -> bool:
 
 
 def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
-    """An address, that of IPv4 where it stands within one of IPv6; None for a name."""
+    """Parse an address, unwrapping an IPv4 address mapped into IPv6; None for a host name."""
     try:
         address = ipaddress.ip_address(host)
     except ValueError:
@@ -138,7 +139,7 @@ def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
 
 
 def _rights(config: zenoh.Config) -> bool:
-    """Whether a stranger may do nothing: all is denied but what is allowed to names and certificates."""
+    """Whether the access control denies everything to clients without a user name or a certificate."""
     may: dict[str, Any] = get(config, "access_control") or {}
     subjects: list[dict[str, Any]] = may.get("subjects") or []
     named = all(one.get("usernames") or one.get("cert_common_names") for one in subjects)

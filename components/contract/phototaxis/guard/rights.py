@@ -1,4 +1,4 @@
-"""Who may write and read what, for a router that guards the bus: generated from the tables of topics and roles.
+"""Generates the access rules of a guarded router, which say which role may write and read which topic.
 
 A component's name at the router is WORLD.ROLE: its user name, or the common name of its certificate.
 """
@@ -16,17 +16,17 @@ class Rights(NamedTuple):
     """What one role may do, as names of topics."""
 
     writes: list[str]
-    """It publishes them."""
+    """Topics that the role publishes."""
     reads: list[str]
-    """It subscribes to them."""
+    """Topics that the role subscribes to."""
     answers: list[str]
-    """It is asked for them."""
+    """Topics on which the role answers queries."""
     asks: list[str]
-    """It asks for them."""
+    """Topics on which the role sends queries."""
 
 
 def rights(role: str) -> Rights:
-    """What a role may do."""
+    """The rights of a role, from `TOPICS` and `ROLES`."""
     own = [topic for topic in TOPICS.values() if topic.writer == role]
     read = *ROLES[role].reads, *ROLES[role].on_demand
     return Rights(
@@ -43,7 +43,7 @@ def subject(world: str, role: str) -> str:
 
 
 def access_control(worlds: Sequence[str]) -> dict[str, Any]:
-    """The `access_control` section of a router's Zenoh configuration: what is not allowed is denied."""
+    """The `access_control` section of a router's Zenoh configuration, which denies everything else."""
     rules: list[dict[str, Any]] = []
     subjects: list[dict[str, Any]] = []
     policies: list[dict[str, Any]] = []
@@ -68,7 +68,7 @@ def access_control(worlds: Sequence[str]) -> dict[str, Any]:
 
 
 def low_pass_filter(worlds: Sequence[str]) -> list[dict[str, Any]]:
-    """The `low_pass_filter` section: larger messages than a topic's limit do not pass."""
+    """The `low_pass_filter` section: the router drops messages larger than their topic's limit."""
     found: list[dict[str, Any]] = []
     for world in worlds:
         for topic in TOPICS.values():
@@ -87,7 +87,7 @@ def low_pass_filter(worlds: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def table() -> str:
-    """Who may do what, as a Markdown table."""
+    """The rights of all roles as a Markdown table, for the documentation."""
     rows: list[str] = []
     for role in ROLES:
         cells = [", ".join(names) or "–" for names in rights(role)]
@@ -96,7 +96,7 @@ def table() -> str:
 
 
 def _rules(world: str, role: str) -> Iterator[dict[str, Any]]:
-    """Ingress is what the component sends to the router, egress what the router sends to it."""
+    """The rules of a role. Ingress is from the component to the router, egress from the router to the component."""
     may = rights(role)
     for what, names, ingress, egress in (
         ("writes", may.writes, ["put"], ["declare_subscriber"]),

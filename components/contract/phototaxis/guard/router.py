@@ -8,20 +8,20 @@ from typing import Any, Literal
 from phototaxis.guard import rights
 
 Auth = Literal["mtls", "password"]
-"""Who is who: by certificate, or by user name and password; encrypted by TLS either way."""
+"""How components authenticate: by certificate, or by user name and password. TLS encrypts both."""
 
 NO_SCOUTING = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
 
 
 def router_config(worlds: Sequence[str], listen: Sequence[str], folder: PurePath, auth: Auth) -> dict[str, Any]:
-    """Of the router.
+    """The Zenoh configuration of the router.
 
     Parameters
     ----------
     worlds : names of the worlds that may be on its bus.
-    listen : its endpoints, as in tls/0.0.0.0:7447.
+    listen : endpoints of the router, such as tls/0.0.0.0:7447.
     folder : where `phototaxis certs` put ca.pem, router.pem, router.key and users.txt.
-    auth : how components say who they are.
+    auth : how components authenticate.
     """
     tls = {
         "root_ca_certificate": str(folder / "ca.pem"),
@@ -43,7 +43,7 @@ def router_config(worlds: Sequence[str], listen: Sequence[str], folder: PurePath
 
 
 def client_config(connect: str, folder: PurePath, name: str, auth: Auth, password: str = "") -> dict[str, Any]:
-    """Of one component, whose name at the router is `name`."""
+    """The Zenoh configuration of one component, whose name at the router is `name` (WORLD.ROLE)."""
     tls = {"root_ca_certificate": str(folder / "ca.pem"), "verify_name_on_connect": True}
     transport: dict[str, Any] = {"link": {"tls": tls, "tx": {"lease": 1000}}}
     if auth == "mtls":

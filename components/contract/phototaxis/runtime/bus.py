@@ -1,8 +1,7 @@
-"""A component's place on the bus: what it writes, what it reads, and who is alive, as one inbox.
+"""A component's connection to the bus: it publishes, and receives messages and liveliness changes in one inbox.
 
-Zenoh's callbacks only put into the inbox; everything else happens in the component's own thread, so a
-component is one loop without locks. Payloads are decoded there; what does not decode is refused and
-counted, and the loop goes on.
+Zenoh's callbacks only put items into the inbox. The component's own thread decodes them, so a component is one
+loop without locks. A payload that cannot be decoded is refused and counted, and the loop goes on.
 """
 
 import sys
@@ -49,7 +48,7 @@ class Bus:
         self.refused: Counter[str] = Counter()
         self._inbox: SimpleQueue[tuple[str, Any]] = SimpleQueue()
         self._decoders: dict[str, Decoder[Any]] = {}
-        self._publishers: dict[str, Any] = {}  # as all that is declared: Zenoh's stubs leave out what methods return
+        self._publishers: dict[str, Any] = {}  # Any here and below: Zenoh's stubs lack return types
         self._declared: list[Any] = []
         self._on_demand: dict[str, Any] = {}
         reads = ROLES[role].reads
@@ -67,14 +66,14 @@ class Bus:
         self._publishers[topic].put(message if isinstance(message, bytes) else encode(message))
 
     def listen(self, topic: str, wanted: bool) -> None:
-        """Receive one of the topics that this role reads at times, or receive it no more."""
+        """Subscribe to a topic that this role reads on demand, or (`wanted` False) unsubscribe from it."""
         if wanted and topic not in self._on_demand:
             self._on_demand[topic] = self._subscribe(TOPICS[topic])
         elif not wanted and topic in self._on_demand:
             self._on_demand.pop(topic).undeclare()
 
     def receive(self, timeout: float | None = None) -> Event | None:
-        """The next event; None when `timeout` seconds brought nothing."""
+        """Return the next event; None if none comes within `timeout` seconds."""
         try:
             source, item = self._inbox.get(timeout=timeout)
         except Empty:
@@ -99,7 +98,7 @@ class Bus:
         self._inbox.put(("stop", None))
 
     def refuse(self, topic: str, why: str) -> None:
-        """Count a message that is not accepted, by the word before the colon; the first is told on stderr."""
+        """Count a refused message by topic and kind (the words before the colon); print the first of a kind."""
         reason = f"{topic}: {why.split(':')[0]}"
         if not self.refused[reason]:
             print(f"{self.role}: refused a message on {topic}: {why}", file=sys.stderr, flush=True)
@@ -108,9 +107,9 @@ class Bus:
     def ask(
         self, topic: str, request: Message | None = None, timeout: float = 2.0, session: zenoh.Session | None = None
     ) -> Iterator[bytes]:
-        """The replies to a query on a topic as they come; none when nobody answers in time.
+        """Send a query on a topic and yield the replies as they arrive; none when nobody answers in time.
 
-        It ends `QUERY_GRACE_S` after the timeout at the latest, whatever became of those who were asked.
+        The iterator ends `QUERY_GRACE_S` after the timeout at the latest, even if a queried component has died.
         """
         replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
         (session or self._session).get(
@@ -133,11 +132,11 @@ class Bus:
                 yield reply.ok.payload.to_bytes()
 
     def ask_aside(self, ask: Ask) -> None:
-        """Send a query without waiting: its answers come as an "answer" event."""
+        """Send a query without waiting; its answers arrive as one "answer" event."""
         Thread(target=self._gather, args=(ask,), daemon=True).start()
 
     def _gather(self, ask: Ask) -> None:
-        """Wait for the answers of a query, in a thread of its own."""
+        """Collect the answers to a query and put them into the inbox; runs in a thread of its own."""
         found: list[Message] = []
         decoder = self._answers(ask.topic)
         with suppress(zenoh.ZError), self._reach(ask.agent) if ask.agent else nullcontext(self._session) as session:
@@ -151,14 +150,14 @@ class Bus:
         self._inbox.put(("answer", Answer(ask.tag, found)))
 
     def ask_agent(self, ident: str, topic: str, request: Message, timeout: float) -> Any:
-        """The answer of one agent as a message; None when it is not there, or gives none in time."""
+        """Ask one agent and return its answer; None when the agent is absent or does not answer in time."""
         with self._reach(ident) as session:
             return None if session is None else self.ask_one(topic, request, timeout, session)
 
     def ask_one(
         self, topic: str, request: Message | None = None, timeout: float = 2.0, session: zenoh.Session | None = None
     ) -> Any:
-        """The first valid reply as a message, or None."""
+        """Ask and return the first valid reply; None when none comes in time."""
         decoder = self._answers(topic)
         for payload in self.ask(topic, request, timeout, session):
             try:
@@ -168,11 +167,11 @@ class Bus:
         return None
 
     def control(self, request: Message, timeout: float = 2.0) -> ControlReply | None:
-        """Ask the simulation for something; None when it did not answer."""
+        """Send a control request to the simulation and return its reply; None when it does not answer."""
         return self.ask_one("control", request, timeout)
 
     def wait_for(self, role: str, timeout: float) -> bool:
-        """Wait until a component of that role is on the bus, dropping what comes meanwhile; whether one is."""
+        """Wait for a component of that role, dropping other events; return whether one is on the bus."""
         deadline = time.monotonic() + timeout
         while (left := deadline - time.monotonic()) > 0:
             event = self.receive(timeout=left)
@@ -181,7 +180,7 @@ class Bus:
         return False
 
     def close(self) -> None:
-        """Take back what was declared, the token last."""
+        """Undeclare everything on the bus, the liveliness token last."""
         for declared in [*self._on_demand.values(), *self._publishers.values(), *self._declared]:
             declared.undeclare()
 
@@ -192,7 +191,7 @@ class Bus:
         self.close()
 
     def _answers(self, topic: str) -> Decoder[Any]:
-        """What decodes the answers to a query."""
+        """The decoder of the answers to a query."""
         asked = TOPICS[topic]
         return Decoder(asked.reply, asked.reply_limit) if asked.reply else Decoder(asked.message, asked.limit)
 

@@ -23,13 +23,13 @@ FORMAT = 3
 """The version of what `CheckpointMetadata` holds; other versions are refused."""
 _MAX_BYTES = 1_000_000_000
 _SPARE_BYTES = 1_000_000
-"""Bytes of a file that are not the arrays' own."""
+"""Bytes of a file left for everything but the arrays' contents."""
 STORABLE_KINDS = "biufcSU"
-"""NumPy's kinds of numbers, and of text, that are read back without pickles."""
+"""NumPy's codes (`dtype.kind`) of the number and text types that can be read back without pickles."""
 
 
 class CheckpointMetadata(Struct, forbid_unknown_fields=True, kw_only=True):
-    """Everything about an agent but its learner's arrays."""
+    """Everything that a checkpoint holds beside the learner's arrays."""
 
     format: int = FORMAT
     learner: str
@@ -39,33 +39,33 @@ class CheckpointMetadata(Struct, forbid_unknown_fields=True, kw_only=True):
     hyperparameters: dict[str, Any]
     exploration: dict[str, Any]
     budget: int
-    """Learning steps that falling rates and temperatures are spread over."""
+    """Number of learning steps over which learning rates and temperatures fall."""
     run: str
     tick: int
-    """The last tick that was answered; −1 for none."""
+    """The last tick that the agent answered; −1 before the first."""
     episode: int
     epoch: int
     steps: int
     lights: list[tuple[float, float]]
     """The last light readings, as in `LightHistory.lights`."""
     state: tuple[float, ...]
-    """The last state: percept and learner's context; empty for none."""
+    """The state at the last tick: the percept, then the learner's context; empty before the first."""
     linked: bool
-    """Whether the last step was learned from, so that the next one continues it."""
+    """Whether the agent learned from the last step, so that the next transition continues it."""
     answer: tuple[Motor, Motor, End] | None
-    """The motor command and the end of the episode with which that tick was answered."""
+    """The answer to the last tick: left motor, right motor, and the end of the episode."""
     random: dict[str, Any]
     """State of the random generator, its large numbers as text."""
     visits: list[int]
-    """How often each percept was met."""
+    """How often the agent met each state of the percept."""
     arena: str
-    """Name of the arena in which it learned last."""
+    """Name of the arena in which the agent learned last."""
     arena_digest: str
-    """`Arena.digest` of that arena; "" where it has learned in none."""
+    """`Arena.digest` of the arena in which the agent learned last; "" if it has learned in none."""
     learner_hash: str
 
     def elsewhere(self, arena: Arena) -> str:
-        """A sentence about where it learned, if that is not this arena; else ""."""
+        """A warning text if the agent learned in another arena than this one; else ""."""
         if self.arena_digest == arena.digest:
             return ""
         there, here = f"'{self.arena}' ({self.arena_digest})", f"'{arena.name}' ({arena.digest})"
@@ -87,7 +87,7 @@ def learner_hash(arrays: dict[str, np.ndarray]) -> str:
 
 
 def storable(arrays: dict[Any, np.ndarray]) -> dict[str, np.ndarray]:
-    """The arrays, if a checkpoint can hold them and give them back.
+    """Return the arrays after checking that a checkpoint can hold them and be read back.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def save(path: Path, meta: CheckpointMetadata, arrays: dict[str, np.ndarray]) ->
     Raises
     ------
     Unavailable
-        when it cannot be written; an older one is then still there.
+        when the file cannot be written; an older checkpoint is then unchanged.
     """
     write_atomic(path, encode(meta, arrays))
 

@@ -1,7 +1,7 @@
-"""What a component wants recorded, published in chunks beside the tick path.
+"""Publishes a component's log in chunks, without delaying the tick path.
 
-Rows are gathered and sent as columns, 16 ticks or 50 ms at a time, on a key that drops under pressure;
-the newest chunks are kept so that a recorder that missed some, or came late, can ask for them.
+Rows are collected and sent as columns, 16 ticks or 50 ms at a time; Zenoh may drop them under congestion.
+The newest chunks are kept, so that a recorder that missed some or started late can ask for them.
 """
 
 import math
@@ -17,7 +17,7 @@ CHUNK_ROWS, CHUNK_AGE_S, MAX_KEPT_CHUNKS = 16, 0.05, 2048
 
 
 class Bus(Protocol):
-    """What chunks need of a component's place on the bus."""
+    """The part of `phototaxis.runtime.bus.Bus` that `LogPublisher` uses."""
 
     @property
     def ident(self) -> str: ...
@@ -42,11 +42,11 @@ class LogPublisher:
 
     @property
     def deadline(self) -> float:
-        """When the rows that wait must be sent."""
+        """When the waiting rows must be sent, on the clock of `now`."""
         return self._since + CHUNK_AGE_S if self._rows else math.inf
 
     def add(self, head: tuple[Any, ...], row: tuple[Any, ...], now: float) -> None:
-        """Add one tick's row; a full chunk is sent."""
+        """Add one tick's row, and send the chunk if it is full."""
         if head != self._head:
             self.flush()
             self._head = head
@@ -57,12 +57,12 @@ class LogPublisher:
             self.flush()
 
     def poll(self, now: float) -> None:
-        """Send a chunk that has waited long enough."""
+        """Send the waiting rows if their deadline has passed."""
         if now >= self.deadline:
             self.flush()
 
     def flush(self) -> None:
-        """Send what there is."""
+        """Send the waiting rows now."""
         if self._rows:
             payload = encode(self._make(self._seq, self._head, list(zip(*self._rows, strict=True))))
             self._rows.clear()

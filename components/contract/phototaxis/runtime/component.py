@@ -22,7 +22,7 @@ from phototaxis.runtime.roles import ROLES
 from phototaxis.runtime.session import BusOptions, agent_session, bus_location, open_session
 
 ORDERLY_END_S = 60.0
-"""Seconds that a component gets to end in good order when the process that it is tethered to is gone."""
+"""Seconds that a tethered component has to shut down cleanly after its parent process is gone."""
 
 
 class ComponentOptions(BusOptions, kw_only=True):
@@ -33,19 +33,19 @@ class ComponentOptions(BusOptions, kw_only=True):
     label: Annotated[str, Meta(max_length=40, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["robot-1"])] = (
         ""
     )
-    """a word in its made-up name on the bus, by which `phototaxis health` finds it"""
+    """a word to include in the generated name on the bus, by which `phototaxis health` finds the component"""
     ident: Annotated[str, Meta(max_length=24, pattern=r"^[A-Za-z0-9_.-]*$", description=WORD, examples=["robot-1"])] = (
         ""
     )
-    """its whole name on the bus, which nobody else may have or have had (default: made up)"""
+    """the whole name on the bus: unique and never reused (default: generated)"""
     restarted: bool = False
-    """this process replaces one that died: continue from what that one left on disk, if anything"""
+    """continue from the files of a process that died, if there are any"""
 
 
 def run(
     role: str, options: ComponentOptions, serve: Callable[[Bus], None], kind: str = "", worlds: Sequence[str] = ()
 ) -> None:
-    """Open the bus as `role`, call `serve(bus)` and close everything, whatever happens.
+    """Open the bus as `role`, call `serve(bus)`, and close everything at the end, also after an error.
 
     SIGTERM and SIGINT put a "stop" event into the inbox; `serve` returns on it. With several `worlds` in
     place of `options.name`, each is served in a thread of its own; the first error ends all of them.
@@ -53,7 +53,7 @@ def run(
     Raises
     ------
     KeyboardInterrupt
-        when all is closed after SIGINT, so that the exit code says so.
+        after SIGINT, once everything is closed, so that the exit code is 130.
     """
     ident = options.ident or unique_name(kind or role, options.label)
     with ExitStack() as stack:
@@ -81,7 +81,7 @@ def _serve(buses: Sequence[Bus], serve: Callable[[Bus], None], stop: Callable[[]
         return
     with ThreadPoolExecutor(len(buses)) as pool:
         served = [pool.submit(serve, bus) for bus in buses]
-        while wait(served, timeout=0.2).not_done:  # and signals are looked for
+        while wait(served, timeout=0.2).not_done:  # wakes up so that Python runs signal handlers
             if any(one.done() and one.exception() for one in served):
                 stop()
     for one in served:
@@ -94,12 +94,12 @@ def _stop(buses: Sequence[Bus]) -> None:
 
 
 def unique_name(kind: str, label: str = "") -> str:
-    """A name on the bus that nobody else has: many may start at the same moment."""
+    """Generate a name that is unique on the bus, even among processes that start at the same moment."""
     return "-".join(filter(None, (kind[:15], label, secrets.token_hex(4))))
 
 
 def _hold_tether(stop: Callable[[], None]) -> None:
-    """Leave when standard input closes: in good order, or without it when code of others does not return."""
+    """Stop when standard input closes, and kill the process after `ORDERLY_END_S` if a plug-in does not return."""
     while os.read(sys.stdin.fileno(), 4096):
         pass
     stop()

@@ -1,7 +1,7 @@
-"""The rules of writing to disk: a place is tried before the work begins, and a file is written whole or not at all.
+"""Writes files safely: paths are tested before the work begins, and a file is written whole or not at all.
 
-What goes wrong is one line that names the place and says why. A place that can never be written is bad input
-(`UserError`, 2); one that is full, and anything that fails after the work has begun, is `Unavailable` (3).
+Errors are one line with the path and the reason. A path that can never be written is bad input (`UserError`,
+exit code 2); a full disk, and a failure after the work has begun, is `Unavailable` (exit code 3).
 """
 
 import errno
@@ -13,18 +13,18 @@ from pathlib import Path
 from phototaxis.runtime.errors import Unavailable, UserError
 
 FULL_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
-"""No space, no quota, a limit on the size of files, a broken disk."""
+"""Error numbers for a full disk, an exceeded quota, a file size limit, and a broken disk."""
 _BLOCK = bytes(4096)
-"""What is written to try a place: a full disk takes empty files."""
+"""Test data for `check_writable`: not empty, because a full disk still accepts empty files."""
 
 
 def check_writable(path: Path, option: str) -> None:
-    """Find out now whether `write_atomic` can write a file later; `option` names it in messages.
+    """Check before the work begins that `write_atomic` can write this file; `option` names it in errors.
 
     Raises
     ------
     UserError
-        when there is no such folder, or the file cannot be written.
+        when the folder does not exist, or the file cannot be written.
     Unavailable
         when the disk is full.
     """
@@ -37,9 +37,9 @@ def check_writable(path: Path, option: str) -> None:
 
 
 def check_folder_writable(folder: Path, option: str, keep: bool = False) -> None:
-    """Find out now whether a folder is there or can be made, and files be written in it; see `check_writable`.
+    """Check that a folder exists or can be made, and that files can be written in it; errors as in `check_writable`.
 
-    With `keep` a folder that had to be made stays.
+    With `keep`, a folder that this check had to make is kept.
     """
     made = [part for part in (folder, *folder.parents) if not part.exists()]
     try:
@@ -55,7 +55,7 @@ def check_folder_writable(folder: Path, option: str, keep: bool = False) -> None
 
 
 def make_folder(folder: Path, mode: int = 0o777) -> None:
-    """Make a folder that has been tried, if it is missing; `Unavailable` when that is not possible any more."""
+    """Make a folder that `check_folder_writable` has accepted; raise `Unavailable` if that now fails."""
     try:
         folder.mkdir(mode, parents=True, exist_ok=True)
     except OSError as error:
@@ -68,7 +68,7 @@ def write_atomic(path: Path, data: bytes) -> None:
     Raises
     ------
     Unavailable
-        when it cannot be written; the old file is then still there.
+        when the file cannot be written; the old file is then unchanged.
     """
     try:
         if _special(path):
@@ -87,7 +87,7 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 
 def append_atomic(path: Path, data: bytes) -> None:
-    """Add to the end of a file; what does not fit is an `OSError`, and no part of it stays."""
+    """Append to a file; on an `OSError` nothing of `data` stays in it."""
     file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
     try:
         size = os.fstat(file).st_size
@@ -101,19 +101,19 @@ def append_atomic(path: Path, data: bytes) -> None:
 
 
 def write_all(file: int, data: bytes) -> None:
-    """`os.write` until everything is written: a nearly full disk takes a part of it without an error."""
+    """Call `os.write` until all is written: a nearly full disk accepts a part without an error."""
     while data:
         data = data[os.write(file, data) :]
 
 
 def write_failure(path: Path, error: OSError) -> Unavailable:
-    """The one line about a file that could not be written."""
+    """The error for a file that could not be written."""
     return Unavailable(f"{path}: {error.strerror}")
 
 
 def _try(path: Path) -> None:
     if path.is_fifo():
-        return  # opening it would wait for its reader
+        return  # opening a pipe would wait for its reader
     if _special(path):
         with path.open("ab", buffering=0) as device:
             device.write(b"")
@@ -127,12 +127,12 @@ def _try(path: Path) -> None:
 
 
 def _special(path: Path) -> bool:
-    """Whether it stands for something else than a file's contents, so that it must not be replaced."""
+    """Whether the path is a device or a pipe, which must be written in place and not replaced."""
     return path.exists() and not path.is_file()
 
 
 def _beside(path: Path) -> Path:
-    """Where the new contents are written first, by each of several writers; a link stays a link."""
+    """A temporary path beside the target, different for each writer; links are resolved so that they stay links."""
     target = Path(os.path.realpath(path))
     return target.with_name(f"{target.name}.{secrets.token_hex(4)}.new")
 

@@ -1,4 +1,4 @@
-"""Errors that a person can act on, and how a command ends on them."""
+"""Errors that a user can act on, and how a command exits after them."""
 
 import errno
 import os
@@ -11,32 +11,32 @@ from typing import NoReturn, TextIO
 from phototaxis.runtime import streams
 
 EXIT_INTERRUPTED = 130
-"""Exit code after Ctrl-C, as shells have it."""
+"""Exit code after Ctrl-C, the same as in shells (128 + SIGINT)."""
 EXIT_READER_GONE = 141
-"""Exit code when whoever read the output closed it, as in `phototaxis status | head -1`."""
+"""Exit code when the reader of the output closes the pipe, as in `phototaxis status | head -1` (128 + SIGPIPE)."""
 THREADS_END_WITHIN_S = 2.0
-"""Seconds that threads get to end when the program ends."""
+"""Seconds that the program waits for other threads when it ends."""
 
 
 class UserError(Exception):
-    """Something the user can mend: one line that says what, where and what to do.
+    """An error that the user can fix: one line says what is wrong, where, and what to do.
 
-    A command that meets one prints ``phototaxis: error: LINE`` on stderr and exits with `exit_code`:
-    2 for input that cannot be used, 3 for a peer or a port that is not available and for what could not
-    be saved, 4 for a component that keeps failing, or a learner's own code.
+    The command prints ``phototaxis: error: LINE`` on stderr and exits with `exit_code`: 2 for unusable input, 3 for
+    a peer or port that is not available and for a file that could not be saved, 4 for a component or a plug-in
+    that fails.
     """
 
     exit_code = 2
 
 
 class Unavailable(UserError):
-    """A port, a bus or a peer is missing or taken; a disk is full."""
+    """A port, a bus or a peer is missing or in use, or a disk is full."""
 
     exit_code = 3
 
 
 class ComponentFailed(UserError):
-    """A process of the run keeps dying, or code that somebody brought along fails."""
+    """A process of the run keeps dying, or the code of a plug-in fails."""
 
     exit_code = 4
 
@@ -47,17 +47,17 @@ _said: set[str] = set()
 
 
 def warn(line: str) -> None:
-    """Print ``phototaxis: warning: LINE`` on stderr, once in a process: for what may be meant as it is."""
+    """Print ``phototaxis: warning: LINE`` on stderr, once per process: for input that is suspicious but allowed."""
     if line not in _said:
         _said.add(line)
         print(f"{WARNING}{line}", file=sys.stderr, flush=True)
 
 
 def one_line(main: Callable[[], int]) -> int:
-    """Run a command's body to its last byte of output; the exit code.
+    """Run a command's body, flush its output, and return the exit code.
 
-    A `UserError` becomes its one line and exit code, Ctrl-C becomes 130. A reader that closed the pipe ends the
-    command without a word.
+    A `UserError` becomes its one line and exit code, Ctrl-C becomes 130. When the reader closes the
+    pipe, the command ends silently.
     """
     streams.prepare()
     try:
@@ -90,7 +90,7 @@ def _body(main: Callable[[], int]) -> int:
 
 
 def _discard_unread_output() -> bool:
-    """Whether a reader of our output is gone; if so, what is still buffered goes nowhere, also at the end."""
+    """Return whether a reader of our output is gone; if so, discard all output that is still buffered."""
     gone = [stream for stream in (sys.stdout, sys.stderr) if _reader_gone(stream)]
     if gone:
         nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -106,7 +106,7 @@ def _reader_gone(stream: TextIO) -> bool:
 
 
 def leave(code: int) -> NoReturn:
-    """End the program with `code`, also when a thread that a learner left behind would keep it alive."""
+    """End the program with `code`, even if a thread that a learner started is still running."""
     if _others():
         timer = threading.Timer(THREADS_END_WITHIN_S, _cut_short, [code])
         timer.daemon = True
@@ -115,7 +115,7 @@ def leave(code: int) -> NoReturn:
 
 
 def _others() -> list[str]:
-    """Names of the threads that Python waits for before it ends."""
+    """Names of the non-daemon threads, for which Python would wait at exit."""
     return [one.name for one in threading.enumerate() if not one.daemon and one is not threading.main_thread()]
 
 

@@ -1,8 +1,8 @@
 """A journal: what happened since the last checkpoint, so that a killed process continues where it was.
 
 Frames are a 4-byte little-endian length, a 4-byte CRC and the payload. The first frame is the header.
-A frame torn by the kill is ignored. Written to the operating system before the effect is published,
-which survives the death of the process (not that of the machine).
+A last frame that a kill left incomplete is ignored. An entry is handed to the operating system before its effect
+is published: it survives the death of the process, but not that of the machine.
 """
 
 import os
@@ -16,14 +16,14 @@ from phototaxis.runtime.errors import UserError
 
 _FRAME = struct.Struct("<II")
 GIVEN_UP = b""
-"""The entry that ends a journal which could not be written on: later ones are missing. No other entry is empty."""
+"""The last entry of a journal that could not be continued: later entries are missing. No other entry is empty."""
 
 
 class Journal:
     """An append-only file that is begun anew at each checkpoint.
 
-    What cannot be written is an `OSError`, and no part of it stays in the file. Then either the same is
-    tried again, or the journal is given up until it is begun anew.
+    A failed write raises `OSError` and leaves no part in the file. The caller may then try again, or give the
+    journal up until the next `begin`.
     """
 
     def __init__(self, path: Path):
@@ -34,16 +34,16 @@ class Journal:
 
     @property
     def kept(self) -> bool:
-        """Whether it is open and complete, so that entries may be appended."""
+        """Whether the journal is open and complete, so that entries may be appended."""
         return self._file is not None
 
     def read(self) -> list[bytes]:
-        """Header and entries of the journal on disk; [] where there is none.
+        """Read the header and the entries of the journal on disk; [] if there is no file.
 
         Raises
         ------
         UserError
-            when it cannot be read, is not a journal, or is damaged before its end.
+            when the file cannot be read, is not a journal, or is damaged before its last frame.
         """
         try:
             data = self.path.read_bytes()
@@ -66,7 +66,7 @@ class Journal:
         return frames
 
     def resume(self, frames: list[bytes]) -> None:
-        """Go on with the journal on disk, which holds these frames; what a kill tore after them is cut off."""
+        """Continue the journal on disk after these frames; an incomplete frame after them is cut off."""
         file = os.open(self.path, os.O_WRONLY)
         sizes = [_FRAME.size + len(frame) for frame in frames]
         self._adopt(file, sizes[0], sum(sizes))
@@ -74,7 +74,7 @@ class Journal:
         os.lseek(file, self._size, os.SEEK_SET)
 
     def begin(self, header: bytes) -> None:
-        """Replace the journal, atomically, by one that holds the header alone."""
+        """Replace the journal atomically by one that holds only the header."""
         fresh = self.path.with_name(f"{self.path.name}.new")
         frame = _framed(header)
         try:
@@ -105,9 +105,9 @@ class Journal:
         self._size += len(frame)
 
     def give_up(self) -> None:
-        """Say in the file that entries are missing from here on, and free its space; only `begin` opens it again.
+        """Mark in the file that entries are missing from here on, and free its space; only `begin` opens it again.
 
-        The mark takes the place of the first entry, where even a full disk has room. Where it has none, the
+        The mark (`GIVEN_UP`) overwrites the first entry, which needs no new disk space. If even that fails, the
         journal is removed.
         """
         if self._file is None:

@@ -1,8 +1,8 @@
-"""What a machine is: a class that decides, and does nothing else. Events go in, effects come out.
+"""The interface of a machine: a class that only decides. It takes events and returns effects.
 
 A machine has no bus, no clock and no disk, so that the same class runs over Zenoh (`Runner`), on a simulated
-network in virtual time, and step by step in a debugger. What it wants to happen it returns as effects, and their order
-is part of the protocol: an entry is in the journal before anybody hears of what it led to.
+network in virtual time, and step by step in a debugger. The order of its effects is part of the protocol: an entry is
+in the journal before its consequence is published.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,18 +15,18 @@ from phototaxis.runtime.checkpoint import CheckpointMetadata
 from phototaxis.wire.messages import Message
 
 Ticket = Callable[[Message | bytes], None]
-"""Stands for one request; a machine hands it back with its answer and never calls it."""
+"""The function that answers one request. A machine puts it into a `Reply` and never calls it."""
 
 
 class Event(NamedTuple):
     """One thing that happened."""
 
     topic: str
-    """The topic of a message or a request, or one of the names below."""
+    """The topic of a message or a request, or the name of another event, such as "start" or "alive"."""
     message: Any = None
-    """The decoded message, or what the event of that name carries."""
+    """The decoded message of a topic, or the data of another event."""
     reply: Ticket | None = None
-    """For a request: what a `Reply` names."""
+    """The ticket of a request, to be put into a `Reply`; None for all other events."""
 
 
 START = Event("start")
@@ -40,7 +40,7 @@ STOP = Event("stop")
 
 
 class Answer(NamedTuple):
-    """What became of an `Ask`."""
+    """The answers to one `Ask`."""
 
     tag: str
     """The tag of the question."""
@@ -54,14 +54,14 @@ class Answer(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """A message that was dropped at the door: it could not be decoded, or is out of range."""
+    """A message that was dropped on arrival: it could not be decoded, or a value is out of range."""
 
     topic: str
     why: str
 
 
 class Unwritten(NamedTuple):
-    """A `Begin`, `Append` or `Save` that the disk did not take. The journal is given up until it is begun anew."""
+    """A `Begin`, `Append` or `Save` that could not be written. The journal is given up until the next `Begin`."""
 
     what: str
     """"journal" or "checkpoint"."""
@@ -92,33 +92,33 @@ class Ask(NamedTuple):
     timeout: float = 2.0
     """Seconds after which the event comes without an answer."""
     every: bool = False
-    """True: gather the answers of every component that answers. False: take the first valid answer."""
+    """True: collect the answers of all components. False: take the first valid answer."""
     agent: str = ""
-    """Ask the agent with this name: agents of one machine are not linked to each other."""
+    """Name of the one agent to ask, over a link made for it: agents on one machine are not linked. "" for everyone."""
 
 
 class Listen(NamedTuple):
-    """Receive a topic that this role reads at times, or receive it no more."""
+    """Subscribe to a topic that this role reads on demand, or unsubscribe from it."""
 
     topic: str
     wanted: bool
 
 
 class Refuse(NamedTuple):
-    """Say that a message is dropped, the first time of each kind."""
+    """Count a dropped message, and report the first of each kind on standard error."""
 
     topic: str
     why: str
 
 
 class Say(NamedTuple):
-    """Tell people one line, on standard error."""
+    """Print one line on standard error."""
 
     text: str
 
 
 class Warn(NamedTuple):
-    """Warn people of what does not stop the process, once for each line."""
+    """Print a warning about something that does not stop the process, once for each line."""
 
     text: str
 
@@ -142,7 +142,7 @@ class Save(NamedTuple):
     arrays: dict[str, np.ndarray]
     header: bytes
     last: bool = False
-    """The process ends after it: a checkpoint that cannot be written is then the process's error."""
+    """Whether the process ends after this save; a failed write is then the error with which it exits."""
 
 
 class Record(NamedTuple):
@@ -153,7 +153,7 @@ class Record(NamedTuple):
 
 
 class Flush(NamedTuple):
-    """Publish the rows that wait, although their chunk is not full."""
+    """Publish the waiting rows, although their chunk is not full."""
 
 
 class Stop(NamedTuple):
@@ -161,20 +161,20 @@ class Stop(NamedTuple):
 
 
 class Own(Struct):
-    """The base of effects that one component's machine has for itself, and its server carries out."""
+    """The base of effects that only one component has; that component's server carries them out."""
 
 
 Effect = Publish | Reply | Ask | Listen | Refuse | Say | Warn | Begin | Append | Save | Record | Flush | Stop | Own
 
 
 class Machine(Protocol):
-    """One component's side of the protocol."""
+    """One component's side of a protocol, as a state machine without input or output."""
 
     def on(self, event: Event, now: float) -> list[Effect]:
-        """What follows from an event. `now`: seconds of a monotonic clock."""
+        """Take an event and return its effects, in order. `now`: seconds of a monotonic clock."""
         ...
 
     @property
     def deadline(self) -> float:
-        """When `TIME` is wanted although nothing else happens, on the clock of `now`; infinity for never."""
+        """When the machine next wants `TIME` if no other event comes, on the clock of `now`; infinity for never."""
         ...

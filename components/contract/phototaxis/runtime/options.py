@@ -1,4 +1,4 @@
-"""Command lines from Structs: a field is an option, its docstring or description the help, its type the check."""
+"""Makes command lines from Structs: each field is an option, its docstring is the help, its type the check."""
 
 import argparse
 import ast
@@ -24,7 +24,7 @@ T = TypeVar("T", bound=msgspec.Struct)
 
 @functools.cache
 def field_help(struct: type) -> dict[str, str]:
-    """The string under each field of a Struct or dataclass, as the attribute docstring it is."""
+    """The docstring of each field of a Struct or dataclass, by the field's name."""
     texts: dict[str, str] = {}
     for base in reversed(struct.__mro__[:-1]):
         try:
@@ -48,9 +48,9 @@ def add_options(
 ) -> None:
     """Give `parser` (or an argument group) one option for each field of `struct`.
 
-    `defaults` are what the help says in place of the Struct's own. Left out on the command line, a field
-    keeps its default. Booleans are flags, `--no-…` for those that are true by default; lists may be
-    repeated. Values are checked in `parse`, so that the messages come from one place.
+    The help shows `defaults` in place of the Struct's own. An option that is left out keeps its default. Booleans
+    are flags (`--no-…` for those that are true by default); options with lists may be repeated. `parse` checks the
+    values, so that all error messages come from one place.
     """
     texts = field_help(struct)
     for item in msgspec.structs.fields(struct):
@@ -86,9 +86,9 @@ def _inner(kind: Any) -> tuple[Any, list[str]]:
 
 
 def convert(struct: type[T], values: dict[str, Any], label: Callable[[str], str] = "--{}".format) -> T:
-    """A Struct from option texts; what does not fit is one line that names the option.
+    """Make a Struct from the texts of options; an error is one line that names the option.
 
-    `label` makes the words that name an option of it, from its field's name with dashes.
+    `label` turns a field's name, with dashes, into the option's name for errors.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def convert(struct: type[T], values: dict[str, Any], label: Callable[[str], str]
             raise UserError(f"{label(name)} is missing")
     try:
         return msgspec.convert(given, struct, strict=False)
-    except msgspec.ValidationError as error:  # of what the Struct itself checks
+    except msgspec.ValidationError as error:  # from the Struct's own __post_init__
         raise UserError(plain(str(error))) from None
 
 
@@ -124,23 +124,23 @@ def _check(item: msgspec.structs.FieldInfo, name: str, value: Any, label: str) -
 
 
 def _example(item: msgspec.structs.FieldInfo) -> str:
-    """A value that fits: one of the examples in the type's `Meta`, else the default."""
+    """A valid value for an error message: an example from the type's `Meta`, else the default."""
     example = next((meta.examples[0] for meta in _metas(item.type) if meta.examples), item.default)
     return f", as in {example}" if example != "" and isinstance(example, (int, float, str)) else ""
 
 
 def _metas(kind: Any) -> list[msgspec.Meta]:
-    """The conditions on a type, also on one that may be None."""
+    """The `Meta` constraints on a type, also on an optional one."""
     found = [meta for one in (kind, *typing.get_args(kind)) for meta in getattr(one, "__metadata__", ())]
     return [meta for meta in found if isinstance(meta, msgspec.Meta)]
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse whose errors are one line, whose long options may not be abbreviated, and which knows what was meant.
+    """An argparse parser with one-line errors that suggest the nearest option; long options cannot be abbreviated.
 
     Parameters
     ----------
-    more : further options that may have been meant, beside its own.
+    more : further options to suggest, beside its own.
     see : the command whose `--help` lists the options; by default `prog`.
     """
 
@@ -153,7 +153,7 @@ class Parser(argparse.ArgumentParser):
         raise UserError(f"{message.removeprefix('argument ')} (see {self._see} --help)")
 
     def read(self, argv: Sequence[str] | None) -> dict[str, Any]:
-        """The options that are given, by their fields' names; of what is not known, which one may have been meant."""
+        """Read the given options, by field name; for an unknown one, raise UserError that suggests the nearest."""
         found, rest = self.parse_known_args(argv)
         if rest:
             word = next((word for word in rest if word.startswith("-")), rest[0]).split("=")[0]
@@ -197,7 +197,7 @@ def parse_groups(
 
 
 def peek(argv: Sequence[str], flag: str, default: str) -> str:
-    """The value of one option before the rest is known (which options there are may depend on it)."""
+    """Read one option before the others, because the set of options depends on it (such as `--learner`)."""
     value = default
     for here, following in pairwise([*argv, None]):
         if here == flag and following is not None:
@@ -208,7 +208,7 @@ def peek(argv: Sequence[str], flag: str, default: str) -> str:
 
 
 def flags(struct: Any) -> list[str]:
-    """A Struct as command-line flags, for a child process; what equals the default is left out."""
+    """Turn a Struct into command-line flags for a child process; defaults are left out."""
     words: list[str] = []
     for item in msgspec.structs.fields(struct):
         value = getattr(struct, item.name)

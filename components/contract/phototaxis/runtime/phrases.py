@@ -1,4 +1,4 @@
-"""How errors say what was expected: in plain words, and with the nearest name that exists."""
+"""Words errors plainly: what was expected, without type names, and the nearest name that exists."""
 
 import re
 from collections.abc import Iterable
@@ -8,7 +8,7 @@ from traceback import extract_tb
 WORD = "letters, digits, '.', '_' and '-'"
 """The form of names on the bus."""
 FORM = "a text of another form"
-"""What is expected of a text that a regular expression checks; the description of its type says it better."""
+"""A placeholder for a regular expression; errors replace it with the `Meta` description of the type."""
 
 _KINDS = {
     "int": "a whole number",
@@ -23,7 +23,7 @@ _BOUNDS = {">=": "of at least", "<=": "of at most", ">": "above", "<": "below", 
 
 
 def plain(text: str) -> str:
-    """What msgspec says of a value that does not fit, without names of types and regular expressions."""
+    """Translate an error text of msgspec into plain words, without type names and regular expressions."""
     text = re.sub(r"`str` matching regex .*?(?=$| - at )", FORM, text)
     text = re.sub(r"`(\w+(?: \| \w+)*)`", lambda found: _kind(found[1]), text)
     text = re.sub(r"of length ([<>]=)? ?(\d+)", lambda found: f"{_BOUNDS[found[1]]} {found[2]} characters", text)
@@ -45,13 +45,13 @@ def nearest(word: str, choices: Iterable[str]) -> str:
 
 
 def known(word: str, choices: Iterable[str]) -> str:
-    """The choices that there are, after the one that `word` resembles most."""
+    """A list of the valid choices, after a suggestion of the nearest to `word`."""
     there = list(choices)
     return f"{nearest(word, there)}there are: {', '.join(there) or 'none'}"
 
 
 def told(error: BaseException, file: str | None = None) -> str:
-    """What somebody else's code raised, in one line: type, text, and the place in `file`, or else the last place."""
+    """Describe a plug-in's exception in one line: type, text, and the last place in `file`, or else the last place."""
     frames = [frame for frame in extract_tb(error.__traceback__)[1:] if "importlib" not in frame.filename]
     frames = [frame for frame in frames if frame.filename == file] or frames
     place = f" ({frames[-1].filename}, line {frames[-1].lineno})" if frames else ""

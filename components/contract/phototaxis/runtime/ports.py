@@ -1,4 +1,4 @@
-"""Ports of this machine: those that nothing listens on, and where the live view is found on those it is given."""
+"""Finds free ports on this machine, and makes the address of the live view."""
 
 import os
 import socket
@@ -15,14 +15,14 @@ def free_ports(count: int) -> list[int]:
 
 
 def find_ports(host: str, wanted: Mapping[str, int]) -> list[int]:
-    """A free TCP port for each option: the one that it names, any for 0, and −1 for −1.
+    """Find a TCP port for each option: the given one if it is free, any free one for 0, and −1 for −1.
 
-    All are held until the last is found.
+    Each port stays bound until all are found, so that no two options get the same one.
 
     Raises
     ------
     Unavailable
-        when one is taken, be it by another of the options.
+        when a port is taken, by a process or by another of the options.
     """
     found: list[int] = []
     with ExitStack() as held:
@@ -47,7 +47,7 @@ def viewer_url(web_port: int, grpc_port: int) -> str:
 
 
 def _holder(port: int) -> str:
-    """Which process listens on a port, as far as this user may know; "" otherwise."""
+    """Describe the process that listens on a port; "" if this user may not see it."""
     try:
         import psutil
     except ModuleNotFoundError:

@@ -13,10 +13,10 @@ Answer = TypeVar("Answer")
 
 
 class AnswerCache(Generic[Answer]):
-    """Answers a tick once; the same question again gets the remembered answer, an older one None.
+    """Answers each tick once: a repeated question gets the remembered answer, an older question None.
 
-    `answer` is called with a message that has `run` and `tick`. Who continues for another one is given the
-    run and tick that were answered last, and the answer.
+    `answer` computes the answer to a message that has `run` and `tick`. A process that continues for another one
+    passes the run, the tick and the answer that were last.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class AnswerCache(Generic[Answer]):
 
 
 class RetransmitTimer:
-    """The simulation's side: when an unanswered tick is to be asked again, and since when it waits.
+    """Decides when the simulation publishes an unanswered tick again, and since when it has waited.
 
     Times are seconds of a monotonic clock. The first repeat comes after `first` seconds; the pause
     doubles up to `most`, so that a slow learner is not flooded.
@@ -48,13 +48,13 @@ class RetransmitTimer:
         self._pause = first
 
     def asked(self, now: float) -> None:
-        """A new tick has been asked."""
+        """Note that a new tick has been published."""
         self.asked_at = now
         self._pause = self._first
         self.repeat_at = now + self._pause
 
     def due(self, now: float) -> bool:
-        """Whether to ask again now; if so the next repeat is planned."""
+        """Return whether to publish again now; if so, plan the next repeat."""
         if now < self.repeat_at:
             return False
         self._pause = min(2 * self._pause, self._most)

@@ -8,28 +8,28 @@ from typing import NamedTuple
 
 
 class Role(NamedTuple):
-    """One kind of participant."""
+    """One kind of component: its topics, its links, and how its process starts and ends."""
 
     reads: tuple[str, ...]
     """Topics that it subscribes to."""
     dials: tuple[str, ...] = ()
-    """Roles that it connects to where no router is used."""
+    """Roles that it connects to when no router is used."""
     listens: bool = True
-    """Whether others may connect to it there."""
+    """Whether others may connect to it when no router is used."""
     asks: tuple[str, ...] = ()
-    """Queries that it sends (of what it reads it may ask, too)."""
+    """Topics that it queries, beside the logs that it reads."""
     on_demand: tuple[str, ...] = ()
     """Topics that it subscribes to only while it needs them."""
     about: str = ""
-    """What its process is; "" for a role that is no component."""
+    """What a process of this role runs, for the help; "" for a role without a process of its own."""
     waits_for: str = ""
-    """Whom it needs before anything happens."""
+    """The components that it needs before it can work, in words."""
     joins_last: bool = False
-    """Whether it is started when all others are on the bus."""
+    """Whether the launcher starts it only when all others are on the bus."""
     may_leave: bool = False
     """Whether its process may end without an error while the run goes on."""
     ends_within_s: float = 0.0
-    """Seconds that it gets to end in good order."""
+    """Seconds that it has to shut down cleanly."""
 
 
 ROLES = {
@@ -55,9 +55,8 @@ ROLES = {
     "launcher": Role(reads=("status",), dials=("sim",), asks=("control",)),
     "observer": Role(reads=("status",), dials=("sim", "launcher"), listens=False, asks=("world", "control", "launch")),
 }  # fmt: skip
-"""In the order in which they are started. They end in the opposite one: the recorder while those it asks are alive.
-
-sim listens, the others dial it. Agents come and go freely: they dial, and listen only for their successors.
+"""The roles in the order in which they start. They end in the opposite order, so that the recorder can still query
+the others. The simulation listens and the others connect to it; agents listen only for their successors.
 """
 
 COMPONENTS = {name: role for name, role in ROLES.items() if role.about}

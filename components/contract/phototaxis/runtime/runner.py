@@ -13,11 +13,11 @@ from phototaxis.runtime.store import Store
 from phototaxis.wire.messages import Message
 
 MAX_WAIT_S = 1.0
-"""The longest wait for an event, so that signals are noticed everywhere."""
+"""The longest wait for an event, so that signals are handled on every system."""
 
 
 class Bus(Protocol):
-    """What the loop needs of a component's place on the bus."""
+    """The part of `phototaxis.runtime.bus.Bus` that the loop uses."""
 
     ident: str
 
@@ -33,12 +33,12 @@ class Runner:
 
     Parameters
     ----------
-    bus : the component's place on the bus.
-    machine : what decides.
-    store : where its journal and checkpoint are; None for a component that keeps nothing.
-    log : gathers the rows that it wants recorded; None for a component without any.
+    bus : the component's connection to the bus.
+    machine : decides what happens.
+    store : writes its journal and checkpoint; None for a component without files.
+    log : publishes the rows that it records; None for a component without a log.
     clock : seconds of a monotonic clock.
-    own : carries out the effects that this machine has for itself.
+    own : carries out the effects that only this machine has.
     """
 
     def __init__(
@@ -83,14 +83,14 @@ class Runner:
         self.finish()
 
     def finish(self) -> None:
-        """Publish what waits to be recorded, after the machine has stopped; raises as `run` does."""
+        """Publish the waiting log rows after the machine has stopped; raises as `run` does."""
         if self._log is not None:
             self._log.flush()
         if self._store.fault is not None:
             raise self._store.fault
 
     def handle(self, event: m.Event) -> None:
-        """Give the machine one event and carry out what follows."""
+        """Give the machine one event and carry out its effects."""
         if self._log is not None and event.topic == self._log.topic:
             self._log.answer(event)
             return
@@ -100,7 +100,7 @@ class Runner:
             self._log.poll(self._clock())
 
     def carry(self, effect: m.Effect) -> None:
-        """Do one thing."""
+        """Carry out one effect."""
         if isinstance(effect, m.Own) and self._own is not None:
             self._own(effect)
         else:
@@ -115,6 +115,6 @@ class Runner:
         self.running = False
 
     def wait(self) -> float:
-        """Seconds until the loop wants to be called although nothing happens."""
+        """Seconds to wait for an event before a deadline of the machine or the log comes."""
         waiting = math.inf if self._log is None else self._log.deadline
         return min(max(min(self._machine.deadline, waiting) - self._clock(), 0.0), MAX_WAIT_S)

@@ -21,7 +21,7 @@ MATCH_WITHIN_S = 5.0
 
 
 class Place(StrEnum):
-    """Where a client stands with respect to the seat."""
+    """A client's state with respect to the seat."""
 
     SEEKING = "seeking"
     """Nobody drives, as far as it knows."""
@@ -121,7 +121,7 @@ class SeatClient:
 
     @property
     def place(self) -> Place:
-        """Where the client stands."""
+        """The client's state with respect to the seat."""
         return self._place.state
 
     def see(self, readings: Readings | BatchReadings, now: float) -> list[Effect]:

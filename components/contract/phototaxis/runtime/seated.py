@@ -1,4 +1,4 @@
-"""What may hold the driver's seat of one robot: the part that a learning agent and a frozen policy share."""
+"""The base of everything that can drive one robot: a learning agent or a frozen policy."""
 
 from typing import Any, NamedTuple, Self
 
@@ -11,7 +11,7 @@ from phototaxis.wire.messages import ENDS, Command, Readings
 
 
 class Step(NamedTuple):
-    """What one tick was for the agent, for the recording."""
+    """What the agent perceived, chose and learned at one tick, for the recording."""
 
     percept: int
     """The number of the percept's state; 0 where states cannot be counted."""
@@ -27,8 +27,8 @@ class SeatedAgent:
 
     Parameters
     ----------
-    name : of what decides; a checkpoint goes only to an agent of the same name and percept.
-    task : what is to be done, and after how many steps an episode is truncated.
+    name : name of the learner or policy; a checkpoint fits only an agent of the same name and percept.
+    task : percept, reward, and the steps after which an episode is truncated.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class SeatedAgent:
     arena, arena_digest : name and digest of the arena that was entered last; "" for none.
     episode : the robot's present episode.
     command : the answer to the last tick.
-    last : what the last tick was for the agent.
+    last : what the agent perceived, chose and learned at the last tick.
     visits : how often each state of the percept was met; empty where states are not counted.
     """
 
@@ -70,7 +70,7 @@ class SeatedAgent:
         raise NotImplementedError
 
     def enter(self, arena: Arena) -> None:
-        """Go on in an arena."""
+        """Note the arena in which the agent now drives."""
         self.arena, self.arena_digest = arena.name, arena.digest
 
     @property

@@ -21,7 +21,7 @@ from phototaxis.runtime.sockets import agent_socket, in_use, remove_stale_socket
 _WORLD = r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,39}"
 _FORM = "up to 40 letters, digits, '_', '.' and '-', the first none of the last two"
 WorldName = Annotated[str, Meta(pattern=rf"^{_WORLD}\Z", description=_FORM)]
-"""A world: a folder, a part of keys and of files' names; so never ".." and never like an option."""
+"""A world's name. It is part of keys, folders and file names, so it cannot be ".." or begin with a dash."""
 WorldNames = Annotated[
     str, Meta(pattern=rf"^{_WORLD}(,{_WORLD})*\Z", description=f"names with commas between them, each {_FORM}")
 ]
@@ -31,7 +31,7 @@ ATTEMPT_S = 1.0
 
 
 class BusOptions(Struct, kw_only=True):
-    """Where the bus is. Without any of these: Unix sockets in a private folder of this machine."""
+    """Where the bus is; by default Unix sockets in a private folder on this machine."""
 
     name: WorldName = "phototaxis"
     """name of the world on the bus, the prefix of its keys; components of one world share it"""
@@ -50,7 +50,7 @@ class BusOptions(Struct, kw_only=True):
 def local_config(role: str, name: str, ident: str) -> zenoh.Config:
     """Peers on this machine, linked by Unix sockets: no router, no multicast, no gossip, no network.
 
-    Of agents there may be several, so each has a socket of its own.
+    There may be several agents, so each has a socket of its own.
     """
     folder, links = socket_folder(name), ROLES[role]
     return _config(
@@ -66,10 +66,10 @@ def _own_socket(folder: Path, role: str, ident: str) -> Path:
 
 @contextmanager
 def agent_session(own: zenoh.Session, options: BusOptions, ident: str) -> Generator[zenoh.Session | None]:
-    """A session in which the agent `ident` can be asked; None when it is not there.
+    """Open a session that reaches the agent `ident`; None when that agent is absent.
 
-    Through a router that is our `own`. Agents of this machine are not linked to each other, so there it is
-    a passing one to that agent's socket.
+    With a router our `own` session reaches it. Agents on one machine are not linked to each other, so without a
+    router this is a temporary session to the agent's socket.
     """
     if _elsewhere(options):
         yield own
@@ -87,12 +87,12 @@ def agent_session(own: zenoh.Session, options: BusOptions, ident: str) -> Genera
 
 
 def bus_location(options: BusOptions) -> str:
-    """Where the bus is, in words."""
+    """Describe where the bus is, for people."""
     return f"through {found}" if (found := _elsewhere(options)) else "on this machine"
 
 
 def _elsewhere(options: BusOptions) -> str:
-    """The configuration file, or the first endpoint, that leads elsewhere than to this machine's own sockets."""
+    """The configuration file or the first endpoint that is used instead of this machine's sockets; "" for neither."""
     return next(iter([*options.listen, *options.connect]), "") or _file(options)
 
 
@@ -128,16 +128,16 @@ def _config(mode: str, listen: list[str], connect: list[str]) -> zenoh.Config:
 def open_session(role: str, options: BusOptions, ident: str = "") -> zenoh.Session:
     """Open this component's session; `ident` is its name on the bus.
 
-    `--listen` and `--connect` win over `--zenoh-config`, that over ZENOH_CONFIG, and that over the
-    sockets of this machine. With `--connect` alone the component is a client (of a router, or of a
-    listening peer); with `--listen` a peer. With `--wait` it tries for so long.
+    The first that is given decides: `--listen` or `--connect`, `--zenoh-config`, ZENOH_CONFIG, the sockets of this
+    machine. With `--connect` alone the component is a client (of a router, or of a listening peer); with `--listen`
+    it is a peer. `--wait` sets how long it tries to connect.
 
     Raises
     ------
     UserError
         for a configuration that cannot be read, or that lets strangers in without `--insecure`.
     Unavailable
-        when an endpoint is taken or cannot be reached.
+        when an endpoint is in use or cannot be reached.
     """
     if not _elsewhere(options):
         return _open_local(role, options.name, ident)
@@ -149,7 +149,7 @@ def open_session(role: str, options: BusOptions, ident: str = "") -> zenoh.Sessi
         return _open(config, options.wait)
     except zenoh.ZError as error:
         where = exposure.get(config, "connect/endpoints")
-        who = f"; {where} may be down, or does not accept who we say we are" if _unreachable(error) and where else ""
+        who = f"; {where} may be down, or rejected our credentials" if _unreachable(error) and where else ""
         raise Unavailable(f"the bus cannot be opened: {_first_line(error)}{who}") from None
 
 
@@ -196,12 +196,12 @@ def _open_local(role: str, name: str, ident: str) -> zenoh.Session:
 
 
 def _open(config: zenoh.Config, wait: float) -> zenoh.Session:
-    """Open a session; where its router cannot be reached, try again for `wait` seconds, and say so.
+    """Open a session; while its router cannot be reached, try again for `wait` seconds, with a line on stderr.
 
     Raises
     ------
     zenoh.ZError
-        of the last attempt.
+        when the last attempt fails.
     """
     if not wait:
         return zenoh.open(config)
@@ -233,7 +233,7 @@ def _from_flags(mode: str, options: BusOptions) -> zenoh.Config:
 
 
 def _from_file(options: BusOptions) -> zenoh.Config:
-    """A file's configuration, in which everything is shut that the file does not ask for."""
+    """Read a configuration from a file, and disable everything that the file does not enable itself."""
     file = _file(options)
     try:
         config = zenoh.Config.from_file(file)
@@ -248,5 +248,5 @@ def _from_file(options: BusOptions) -> zenoh.Config:
 
 
 def _first_line(error: Exception) -> str:
-    """Zenoh's own words without the source locations of its Rust code."""
+    """The first line of Zenoh's error text, without source locations in its Rust code."""
     return re.sub(r" at \S+\.rs:\d+\.?", "", str(error)).splitlines()[0]

@@ -1,4 +1,4 @@
-"""This machine's own sockets: the private folder of a world, and who listens there."""
+"""The Unix sockets of a world on this machine: their private folder, and whether a process listens on one."""
 
 import fcntl
 import hashlib
@@ -12,19 +12,19 @@ from pathlib import Path
 from phototaxis.runtime.errors import Unavailable
 
 MAX_PATH_BYTES = 103
-"""Bytes of a Unix socket's path that every system takes (macOS; Linux takes 107)."""
+"""Longest path of a Unix socket, in bytes, that all systems accept (macOS 103, Linux 107)."""
 MAX_SOCKET_NAME_BYTES = len("/agent-") + 16
-"""Bytes of the longest name that a socket has in its folder."""
+"""Longest name of a socket in its folder, in bytes."""
 ADVICE = "set XDG_RUNTIME_DIR to another folder of yours"
 
 
 def socket_folder(name: str) -> Path:
-    """The private folder (mode 0700) that holds the Unix sockets of one world; made where missing.
+    """The private folder (mode 0700) that holds the Unix sockets of one world; make it if it is missing.
 
     Raises
     ------
     Unavailable
-        when the folder cannot be made, belongs to somebody else, lets others in, or has a path that no
+        when the folder cannot be made, belongs to another user, is accessible to others, or has a path that no
         Zenoh endpoint can name.
     """
     root = _root()
@@ -44,7 +44,7 @@ def socket_folder(name: str) -> Path:
 
 
 def _root() -> Path:
-    """The folder of all worlds of this user: in XDG_RUNTIME_DIR, or where temporary files are."""
+    """The folder of all worlds of this user: in XDG_RUNTIME_DIR, or else in the folder for temporary files."""
     base = os.environ.get("XDG_RUNTIME_DIR")
     if not base:
         try:
@@ -56,7 +56,7 @@ def _root() -> Path:
     try:
         owner = os.stat(base).st_uid
     except OSError:
-        owner = os.getuid()  # it is missing, or what is wrong with it shows when we make our folder in it
+        owner = os.getuid()  # making our folder in it will report the fault
     if owner not in (os.getuid(), 0):
         raise Unavailable(f"XDG_RUNTIME_DIR is {base}, which belongs to the user with the number {owner}; {ADVICE}")
     return Path(base) / "phototaxis"
@@ -86,7 +86,7 @@ def agent_socket(folder: Path, ident: str) -> Path:
 
 
 def in_use(socket: Path) -> bool:
-    """Whether a living process listens there: Zenoh holds a lock on the file beside a socket until its process ends."""
+    """Whether a living process listens on a socket: until it ends, Zenoh locks the file beside the socket."""
     try:
         with _lock_file(socket).open() as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -99,8 +99,8 @@ def in_use(socket: Path) -> bool:
 
 @contextmanager
 def startup_lock(folder: Path) -> Generator[None]:
-    """Agents that start at the same moment sweep and open one after another: a socket that has just been made,
-    but is not yet locked, would look like one that a killed agent left."""
+    """Let only one agent at a time remove stale sockets and open its own: a socket that exists but is not locked
+    yet looks like one that a killed agent left."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)
@@ -110,7 +110,7 @@ def startup_lock(folder: Path) -> Generator[None]:
 
 
 def remove_stale_sockets(folder: Path) -> None:
-    """Remove the sockets that killed agents left: nobody holds their locks."""
+    """Remove the sockets of killed agents, whose locks no process holds."""
     for lock in folder.glob("agent-*.lock"):
         socket = lock.with_suffix("")
         if not in_use(socket):

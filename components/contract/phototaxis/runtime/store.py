@@ -12,11 +12,11 @@ from phototaxis.runtime.machine import Append, Begin, Save, Unwritten
 class Store:
     """Carries out `Begin`, `Append` and `Save`; without a file they do nothing.
 
-    A journal that cannot be written is given up, with a mark in the file that says so, until it is begun anew.
+    A journal that cannot be written is given up, and marked so in the file, until the next `Begin` or `Save`.
 
     Attributes
     ----------
-    fault : why the last checkpoint of the process could not be written; None while all is well.
+    fault : why the final checkpoint of the process could not be written; None if there was no such error.
     """
 
     def __init__(self, journal: Journal | None = None, checkpoint: Path | None = None):
@@ -24,7 +24,7 @@ class Store:
         self.fault: UserError | None = None
 
     def carry(self, effect: Begin | Append | Save) -> Unwritten | None:
-        """Write; what the machine is told when the disk does not take it."""
+        """Write to disk; return an event for the machine when that fails, else None."""
         if isinstance(effect, Save):
             return self._save(effect) or self._begin(effect.header)
         return self._begin(effect.header) if isinstance(effect, Begin) else self._append(effect.entry)

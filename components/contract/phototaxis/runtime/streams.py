@@ -1,4 +1,4 @@
-"""Standard streams as a program needs them, whatever it was started with."""
+"""Makes the standard streams safe to use, however the program was started."""
 
 import io
 import os
@@ -6,7 +6,7 @@ import sys
 
 
 class _Dropping(io.FileIO):
-    """A file that takes everything, and keeps what can be written."""
+    """A file whose writes never fail: data that cannot be written is dropped."""
 
     def write(self, data: object) -> int:
         try:
@@ -16,11 +16,11 @@ class _Dropping(io.FileIO):
 
 
 def prepare() -> None:
-    """Stand in for standard streams that are closed; write "?" for characters that a terminal or pipe does not have.
+    """Replace closed standard streams; write "?" for characters that the terminal or pipe cannot encode.
 
-    Without a stand-in the next file or socket that is opened would get the number of the closed stream, and with it
-    whatever libraries print. What cannot be written to standard error is dropped: a log on a full disk does not end
-    the process that writes it.
+    Otherwise the next file or socket would get the descriptor of the closed stream, and receive whatever libraries
+    print. Data that cannot be written to standard error is dropped, so that a log on a full disk does not end the
+    process.
     """
     while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(number, True)

@@ -1,4 +1,4 @@
-"""A machine's states: one table says which input leads from which state to which."""
+"""The states of a machine: a table maps each state and input to the next state."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -9,11 +9,11 @@ InputT = TypeVar("InputT", bound=StrEnum)
 
 
 class Transitions(Generic[StateT, InputT]):
-    """The state of one machine, which changes by the rows of its table alone.
+    """The state of one machine, which only the rows of its table can change.
 
     Parameters
     ----------
-    table : for each state and input that may meet, the next state.
+    table : the next state for each allowed pair of state and input.
     state : the first state.
     """
 
@@ -21,12 +21,12 @@ class Transitions(Generic[StateT, InputT]):
         self._table, self.state = table, state
 
     def take(self, given: InputT) -> StateT:
-        """Go on by one input; the new state.
+        """Take one input, and return the new state.
 
         Raises
         ------
         KeyError
-            when the table has no row for it: a defect of the machine.
+            when the table has no row for this state and input: a defect of the machine.
         """
         self.state = self._table[self.state, given]
         return self.state

@@ -1,4 +1,4 @@
-"""The light-seeking task of the paper: what a robot observes, may do and earns, and when its episode ends.
+"""The light-seeking task of the paper: observations, actions, rewards, and the end of an episode.
 
 "Combining Q-Learning with Artificial Neural Networks in an Adaptive Light Seeking Robot"; each definition names its
 section. The same definitions serve one robot, with a number for each quantity, and N robots, with an array whose last

@@ -7,16 +7,16 @@ ACTIONS: tuple[tuple[float, float], ...] = (
     (1.0, 0.0), (1.0, 1.0), (1.0, -1.0),
     (-1.0, 0.0), (-1.0, 1.0), (-1.0, -1.0),
 )  # fmt: skip
-"""The motor commands (left, right) of figure 5, in its order (which numbers the last one 9)."""
+"""The motor commands (left, right) of figure 5, in the order of the figure, which counts them from 1."""
 
 MOTORS = np.array(ACTIONS)
-"""The same as an array, (9, 2)."""
+"""`ACTIONS` as an array (9, 2)."""
 
 FORWARD = tuple(i for i, (left, right) in enumerate(ACTIONS) if left + right >= 0)
 """The actions without net backward motion, which the rich percept allows (section 4.2)."""
 
 MOVING = tuple(i for i in FORWARD if any(ACTIONS[i]))
-"""Those of `FORWARD` that move the robot, which the continuous percept allows."""
+"""The actions of `FORWARD` that move the robot, which the continuous percept allows."""
 
 MIRRORED = tuple(ACTIONS.index((right, left)) for left, right in ACTIONS)
 """Each action seen in a mirror: left and right exchanged."""

@@ -1,6 +1,6 @@
-"""The operations that Python writes differently for one number and for an array with a number for each robot.
+"""Operations that need different functions for one robot's numbers and for arrays with a number per robot.
 
-A definition that uses these, comparisons and `+ - * / & |` serves both and gives the same floats to the last bit.
+A definition made of these, comparisons and `+ - * / & |` works for both, and gives bit-identical floats.
 """
 
 import math
@@ -22,7 +22,7 @@ class Arithmetic(NamedTuple):
     smallest: Callable[..., Any]
     log: Callable[[Any], Any]
     first: Callable[[Cases, Any], Any]
-    """The value of the first case whose condition holds; the second argument where none holds."""
+    """The value of the first case whose condition holds; the second argument if none holds."""
 
 
 def _first_of_one(cases: Cases, otherwise: Any) -> Any:

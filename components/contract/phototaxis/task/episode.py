@@ -1,4 +1,4 @@
-"""What an episode is: where it begins, how many steps it has, and when it ends."""
+"""Follows an episode: where it begins, how many steps it has, and when it ends."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from phototaxis.task.observation import at_goal
 from phototaxis.wire.messages import ENDS, Readings
 
 TERMINATED, TRUNCATED, RESET = (ENDS.index(end) for end in ("terminated", "truncated", "reset"))
-"""The numbers of an episode's ends in `ENDS`."""
+"""Indices of an episode's ends in `ENDS`."""
 
 
 class Episode:
@@ -23,7 +23,7 @@ class Episode:
     now : the newest observation.
     terminated : whether the robot is at the light.
     history : the light readings up to `now`.
-    run, number, tick : of the newest readings that were followed; "", −1 and −1 before the first.
+    run, number, tick : run, episode and tick of the newest readings given to `follow`; "", −1 and −1 before the first.
     """
 
     def __init__(self, max_episode_steps: float, robots: int | None = None):
@@ -34,7 +34,7 @@ class Episode:
         self._max_episode_steps = max_episode_steps
 
     def begin(self, observation: Any, which: Any = True) -> None:
-        """Begin an episode with this observation; the robots outside of the mask `which` (N,) go on with theirs."""
+        """Begin an episode with this observation; robots outside the mask `which` (N,) continue theirs."""
         self.now, self.terminated = observation, at_goal(observation)
         self.history.begin(observation.light, which)
 
@@ -56,10 +56,10 @@ class Episode:
 
     @property
     def truncated(self) -> Any:
-        """Whether the episode has its full number of steps."""
+        """Whether the episode has reached the step cap."""
         return self.steps >= self._max_episode_steps
 
     @property
     def end(self) -> Any:
-        """How the episode ends at `now`, as a number of `ENDS`: 0 where it goes on."""
+        """How the episode ends at `now`, as an index into `ENDS`; 0 while it goes on."""
         return self.history.arithmetic.first([(self.terminated, TERMINATED), (self.truncated, TRUNCATED)], 0)

@@ -16,7 +16,7 @@ UNCHANGED_STEPS = 5
 
 
 class LightHistory:
-    """What percepts and rewards know of the light in the steps before.
+    """Keeps the recent light readings of an episode for percepts and rewards.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class LightHistory:
         self._unchanged: Any = None
 
     def begin(self, light: Any, which: Any = True) -> None:
-        """Begin an episode with this reading; for the robots outside of the mask `which` (N,) nothing happens."""
+        """Begin an episode with this reading; robots outside the mask `which` (N,) are unchanged."""
         first = self.arithmetic.first
         self.lights.extend([first([(which, light)], past) for past in self.lights])
         self.steps = first([(which, 0)], self.steps)
@@ -50,13 +50,13 @@ class LightHistory:
         self._unchanged = None
 
     def restore(self, lights: Iterable[Any], steps: Any) -> None:
-        """Go on with the `lights` and `steps` of another history."""
+        """Continue from the `lights` and `steps` of another history."""
         self.lights.extend(lights)
         self.steps, self._unchanged = steps, None
 
     @property
     def before(self) -> Any:
-        """The reading of the step before; at the first step that of the step itself."""
+        """The reading of the previous step; at an episode's first observation, that observation's own."""
         return self.lights[-2]
 
     @property

@@ -1,4 +1,4 @@
-"""What is to be learned, as options of a command line."""
+"""Command-line options that define the task: percept, reward and step cap."""
 
 from typing import Annotated, Literal
 
@@ -7,16 +7,16 @@ from msgspec import Meta, Struct
 from phototaxis.task.rewards import REWARDS, Reward, Scheme
 
 OWN_REWARD: dict[str, Scheme] = {"simple": "difference", "rich": "static", "continuous": "potential"}
-"""The scheme that the paper gave each of its percepts, and the one that suits the third."""
+"""The default reward scheme of each percept: the paper's for its two, and a suitable one for "continuous"."""
 
 
 class TaskOptions(Struct, kw_only=True):
-    """What is to be learned."""
+    """Options that define the task."""
 
     percept: Literal["simple", "rich", "continuous"] = "simple"
-    """what the learner sees: 24 states, 400 states (both the paper's), or 12 real numbers"""
+    """what the learner perceives: 24 states or 400 states (both from the paper), or 12 real numbers"""
     reward: Literal["own", "difference", "static", "potential"] = "own"
-    """reward scheme; own: the percept's (simple: difference, rich: static, continuous: potential)"""
+    """reward scheme; own: the percept's default (simple: difference, rich: static, continuous: potential)"""
     max_episode_steps: Annotated[int, Meta(ge=1)] = 100
     """steps after which an episode is truncated while learning"""
 

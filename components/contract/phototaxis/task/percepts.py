@@ -1,4 +1,4 @@
-"""What a learner sees of a robot's observations."""
+"""Percepts: how an observation becomes the state that a learner sees."""
 
 from typing import Any, Protocol
 
@@ -11,21 +11,21 @@ PerceptState = tuple[float, ...]
 
 
 class Percept(Protocol):
-    """How readings become what the learner sees."""
+    """Turns an observation into the state that the learner sees."""
 
     name: str
     variables: tuple[str, ...]
     sizes: tuple[int, ...]
     """Number of values of each variable; 0 for a real number in −1..1."""
     actions: tuple[int, ...]
-    """The actions that may be taken, as indices into `ACTIONS`."""
+    """The actions that the percept allows, as indices into `ACTIONS`."""
 
     def state(self, observation: Observation, history: LightHistory, near: float) -> PerceptState:
         """One value for each variable. `near` is the obstacle threshold in m; `history` ends with `observation`."""
         ...
 
     def mirror(self, state: PerceptState) -> PerceptState:
-        """The state that a mirror would show: left and right exchanged."""
+        """The mirror image of a state: left and right exchanged."""
         ...
 
 
@@ -119,7 +119,7 @@ def _contrast(one: Any, other: Any) -> Any:
 
 
 def _nearness(one: Any, other: Any) -> Any:
-    """0 where both ranges are 1 m or more, 1 where the smaller is 0."""
+    """How near the smaller of two ranges is: 0 at 1 m or more, 1 at 0 m."""
     closer = (one + other - abs(one - other)) / 2
     return 1 - (closer + 1 - abs(closer - 1)) / 2
 
@@ -128,7 +128,7 @@ PERCEPTS: dict[str, Percept] = {percept.name: percept for percept in (Simple(), 
 
 
 def state_number(percept: Percept, state: PerceptState) -> Any:
-    """The number of a countable state, counted with the last variable fastest; an array for a state of arrays."""
+    """The number of a countable state, with the last variable changing fastest; an array for a state of arrays."""
     number: Any = 0
     for value, size in zip(state, percept.sizes, strict=True):
         number = number * size + value

@@ -1,4 +1,4 @@
-"""What a step earns."""
+"""The reward schemes: how much a step earns."""
 
 from typing import Any, Literal
 
@@ -7,21 +7,21 @@ from msgspec import Struct
 from phototaxis.task.episode import Episode
 
 DARK = 0.005
-"""The light reading (0..1) below which its logarithm falls no more (reward scheme "potential")."""
+"""Lower bound of a light reading (0..1) before its logarithm is taken (reward scheme "potential")."""
 
 Scheme = Literal["difference", "static", "potential"]
 
 
 class Reward(Struct, frozen=True):
-    """The reinforcement values of section 4.4, and one more scheme.
+    """The rewards of section 4.4, and one more scheme.
 
-    The first that holds decides: `goal` at the light; `collision` in front or at the rear; `unchanged` while the
-    light is unchanged for 5 steps. In all other cases the brighter of the two readings does:
+    The first case that holds decides: `goal` at the light; `collision` in front or at the rear; `unchanged` after 5
+    steps of unchanged light. In all other cases the scheme rewards the change of the brighter of the two readings:
 
-    - "difference" (the simple percept's): its difference to the last step;
-    - "static" (the rich one's): `approach` for any increase;
-    - "potential" (not the paper's): the difference of its logarithm, a potential-based shaping (Ng, Harada
-      and Russell 1999): a circle earns nothing, and a step towards the light earns alike near and far.
+    - "difference" (the simple percept's): its difference from the previous step;
+    - "static" (the rich percept's): `approach` for any increase;
+    - "potential" (not in the paper): the difference of its logarithm, a potential-based shaping (Ng, Harada and
+      Russell 1999): a closed path earns nothing, and equal relative gains of light earn the same near and far.
     """
 
     scheme: Scheme
@@ -42,7 +42,7 @@ class Reward(Struct, frozen=True):
         return history.arithmetic.first(cases, self._approach(episode))
 
     def _approach(self, episode: Episode) -> Any:
-        """What a step earns that met nothing special."""
+        """The reward of a step without goal, collision or unchanged light."""
         history = episode.history
         if self.scheme == "difference":
             return history.gain

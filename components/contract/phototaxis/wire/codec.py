@@ -1,4 +1,4 @@
-"""From messages to bytes and back: what is oversized, malformed or foreign is refused at the door."""
+"""Encodes and decodes messages; refuses payloads that are too large, malformed or of another schema."""
 
 from typing import Any, Generic, TypeVar
 
@@ -9,7 +9,7 @@ from phototaxis.wire.messages import SCHEMA, Message
 
 
 class Refused(Exception):
-    """A payload that is not a valid message: a kind of reason, a colon, and the details."""
+    """A message is not accepted. The text is the kind of reason, a colon, and the details."""
 
 
 M = TypeVar("M", bound=Message)
@@ -23,7 +23,7 @@ encode = msgspec.msgpack.Encoder().encode
 
 
 class Decoder(Generic[M]):
-    """Decodes one message type from MessagePack or JSON, refusing what is oversized, malformed or foreign."""
+    """Decodes one message type from MessagePack or JSON, and raises `Refused` for an invalid payload."""
 
     def __init__(self, kind: type[M], limit: int):
         self._limit = limit

@@ -1,4 +1,4 @@
-"""Columns of the messages of many robots: arrays as little-endian bytes, and back, with their size checked."""
+"""Turns the columns of batch messages from arrays to little-endian bytes and back, and checks their size."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def unpack(data: bytes, robots: int, rows: int = 1, kind: np.dtype = REAL) -> np
     Raises
     ------
     Refused
-        when the bytes are not that many, or a real number is not finite.
+        when the number of bytes does not match, or a real number is not finite.
     """
     if len(data) != rows * robots * kind.itemsize:
         raise Refused(f"size: {len(data)} bytes for {rows} × {robots} of {kind.itemsize} bytes")

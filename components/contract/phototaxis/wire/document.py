@@ -1,4 +1,4 @@
-"""The wire format as a page for those who write a component in another language, made from the tables and Structs."""
+"""Makes docs/wire.md, the reference for writing a component in another language, from the tables and Structs."""
 
 import json
 import typing
@@ -18,7 +18,7 @@ PAGE = files("phototaxis.wire") / "wire.md.in"
 
 
 def page() -> str:
-    """docs/wire.md."""
+    """The text of docs/wire.md."""
     defaults = {name: value.default for name, value in _parameters(protocol.RetransmitTimer).items()}
     return Template(PAGE.read_text(encoding="utf-8")).substitute(
         schema=messages.SCHEMA,
@@ -54,7 +54,7 @@ def _keys() -> dict[type[msgspec.Struct], str]:
 
 
 def structs(*kinds: Any) -> list[type[msgspec.Struct]]:
-    """Each Struct that is among types or inside them, once, the outer before the inner."""
+    """All Structs among these types or nested in them, once each, the outer before the inner."""
     return [*dict.fromkeys(chain.from_iterable(map(_inside, kinds)))]
 
 
@@ -81,7 +81,7 @@ def _fields(kind: type[msgspec.Struct], key: str = "") -> str:
 
 
 def _type(kind: Any) -> str:
-    """A field's type in JSON Schema's words, short."""
+    """A short description of a field's type, with the words of JSON Schema."""
     found = msgspec.json.schema(kind)
     if "enum" in found:
         return " or ".join(f'`"{one}"`' for one in found["enum"])

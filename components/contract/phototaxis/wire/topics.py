@@ -5,9 +5,9 @@ from typing import Literal, NamedTuple
 from phototaxis.wire import messages as m
 
 Kind = Literal["stream", "retained", "log", "query"]
-"""stream: the lockstep path, delivered or repeated. retained: answered by a queryable at any time.
-log: columns to be recorded, dropped under pressure, kept a while and answered by a queryable.
-query: a question to the writer, whose message is the question."""
+"""How a topic is carried. stream: published; the simulation repeats a tick that gets no answer. retained: a queryable
+answers with the message at any time. log: published in columns, may be dropped under congestion; a queryable answers
+with the newest chunks. query: a request to the writer, which answers it."""
 
 
 class Topic(NamedTuple):
@@ -18,12 +18,12 @@ class Topic(NamedTuple):
     writer: str
     kind: Kind
     limit: int
-    """Largest payload that is accepted, bytes; of a query: of the question."""
+    """Largest accepted payload, in bytes; for a query, of the request."""
     about: str
     reply: type[m.Message] | None = None
-    """What a query is answered with."""
+    """Type of the answer to a query; None for topics of other kinds."""
     reply_limit: int = 0
-    """Largest answer that is accepted, bytes."""
+    """Largest accepted answer to a query, in bytes."""
 
     def key(self, prefix: str) -> str:
         """The Zenoh key under the prefix of one world."""
@@ -33,15 +33,15 @@ class Topic(NamedTuple):
 TOPICS = {
     topic.name: topic
     for topic in (
-        Topic("world", m.World, "sim", "retained", 16_000_000, "the arena and what else does not change"),
+        Topic("world", m.World, "sim", "retained", 16_000_000, "the arena and all else that stays fixed during a run"),
         Topic("state", m.State, "sim", "stream", 4_096, "pose, contacts, applied command, seat holder"),
         Topic("readings", m.Readings, "sensors", "stream", 4_096, "sonars, lights, bumpers, echoed command"),
         Topic("command", m.Command, "agent", "stream", 4_096, "the answer: two motors, or the episode's end"),
-        Topic("batch/state", m.BatchState, "sim", "stream", 1_000_000, "the same of many robots at once"),
-        Topic("batch/readings", m.BatchReadings, "sensors", "stream", 2_000_000, "the same of many robots at once"),
-        Topic("batch/command", m.BatchCommand, "agent", "stream", 200_000, "the same for many robots at once"),
-        Topic("episode", m.EndedEpisode, "sim", "stream", 4_096, "one episode, when it has ended"),
-        Topic("status", m.Status, "sim", "stream", 32_768, "how the run is doing, 5 times a second"),
+        Topic("batch/state", m.BatchState, "sim", "stream", 1_000_000, "the states of many robots"),
+        Topic("batch/readings", m.BatchReadings, "sensors", "stream", 2_000_000, "the readings of many robots"),
+        Topic("batch/command", m.BatchCommand, "agent", "stream", 200_000, "the answer for many robots"),
+        Topic("episode", m.EndedEpisode, "sim", "stream", 4_096, "summary of an episode, when it has ended"),
+        Topic("status", m.Status, "sim", "stream", 32_768, "progress and health of the run, 5 times a second"),
         Topic(
             "control",
             m.Control,
@@ -58,7 +58,7 @@ TOPICS = {
             "agent",
             "query",
             4_096,
-            "what a successor needs to continue",
+            "everything that a successor needs to continue",
             m.CheckpointReply,
             256_000_000,
         ),
@@ -72,7 +72,7 @@ TOPICS = {
             m.LaunchReply,
             4_096,
         ),
-        Topic("recording", m.RecordingProgress, "recorder", "stream", 4_096, "how far the recording is, once a second"),
+        Topic("recording", m.RecordingProgress, "recorder", "stream", 4_096, "the recording's progress, once a second"),
         Topic("log/sim", m.SimLog, "sim", "log", 1_000_000, "poses, commands, ended episodes, in columns"),
         Topic("log/sensors", m.SensorsLog, "sensors", "log", 1_000_000, "readings, in columns"),
         Topic("log/agent", m.AgentLog, "agent", "log", 4_000_000, "percepts, actions, learning, in columns"),
@@ -89,7 +89,7 @@ class StepTopics(NamedTuple):
 
 
 def step_topics(robots: int) -> StepTopics:
-    """Where the step protocol of a world with so many robots is spoken."""
+    """The topics of the step protocol in a world with this number of robots."""
     prefix = "batch/" if robots > 1 else ""
     return StepTopics(*(f"{prefix}{name}" for name in StepTopics._fields))
 
