@@ -133,6 +133,16 @@ def test_what_nobody_has_any_more_is_left_out():
     assert play.numbers() == [0, 3, 4]
 
 
+def test_an_answer_says_nothing_of_a_chunk_that_was_published_after_the_question():
+    play = Play()
+    everybody = {asked.topic: asked for asked in questions(play.tell(SIM, world()))}
+    play.tell(came(1))
+    (asked,) = questions(play.tell(answer(everybody["log/sim"])))
+    assert asked.request == LogRequest(seq=0, writer="sim")
+    play.tell(answer(asked, log(0), log(1)))
+    assert play.numbers() == [0, 1]
+
+
 def test_a_second_gap_behind_the_first_is_asked_for_too():
     play = recording()
     (first,) = questions(play.tell(came(2)))

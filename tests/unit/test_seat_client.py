@@ -128,6 +128,28 @@ def test_who_has_taken_over_once_claims_from_then_on_and_leaves_for_a_successor(
     assert client.place is Place.SUPERSEDED
 
 
+def driven(tick: int) -> SeatClient:
+    """A client that was named at a tick, and then sees that nobody drives."""
+    client = SeatClient("me", "take over")
+    client.see(readings(tick, driver="me", author="former"), 0.0)
+    client.see(readings(tick, driver="", author="former"), 0.1)
+    assert client.place is Place.SEEKING
+    return client
+
+
+def test_who_is_succeeded_learns_it_although_its_successor_is_gone_again():
+    client = driven(5)
+    assert asked(client.see(readings(6, driver="", author="successor"), 1.0)) == []
+    assert client.place is Place.SUPERSEDED
+
+
+def test_a_predecessor_is_no_successor_when_the_simulation_comes_back_to_the_same_tick():
+    client = driven(5)
+    client.answered(None)
+    assert asked(client.see(readings(5, driver="", author="former"), 1.0)) == ["claim"]
+    assert client.place is Place.SEEKING
+
+
 def test_readings_that_were_overtaken_say_nothing():
     client = SeatClient("me")
     client.see(readings(4, driver="a"), 0.0)

@@ -39,7 +39,9 @@ class LogReader:
         self._held: list[Any] = []
         """Chunks that came while a question was open."""
         self._asked: set[str] = set()
-        """The writers that the open questions ask; "" stands for all writers."""
+        """The writers that open questions ask for what precedes a held chunk; "" stands for all writers.
+
+        An answer tells only of chunks that were published before the question came."""
         self._found: list[Any] = []
         """Chunks from the answers that came while other questions were open."""
 
@@ -85,7 +87,8 @@ class LogReader:
             return
         tag = f"{self.topic} {next(self._tags)}"
         self.open.add(tag)
-        self._asked.add(writer)
+        if self._held:
+            self._asked.add(writer)
         yield Ask(tag, self.topic, LogRequest(seq=self._expected.get(writer, 0), writer=writer), every=True)
 
     def _write(self, chunk: Any) -> Iterator[Effect]:

@@ -34,6 +34,8 @@ class Snapshot(Struct):
     """Name of the agent that held the seat."""
     arena: str = ""
     """`Arena.digest`."""
+    author: str = ""
+    """Name of the agent whose command ended the episode before."""
 
 
 class Simulation:
@@ -118,7 +120,7 @@ class Simulation:
                 )
             self._episode += 1
             self._steps = 0
-            self.state = self._begin(start)
+            self.state = self._begin(start, author)
         else:
             self._epoch += 1
             self._steps += 1
@@ -139,6 +141,7 @@ class Simulation:
             recent,
             driver,
             self.digest,
+            self.state.author,
         )
 
     def restore(self, at: Snapshot, start: Pose | None = None) -> None:
@@ -148,13 +151,13 @@ class Simulation:
         """
         self._tick, self._episode, self._epoch, self._steps = at.tick, at.episode, at.epoch, 0
         self.episodes, self.reached, self._chain = at.episodes, at.reached, at.chain
-        self.state = self._begin(start)
+        self.state = self._begin(start, at.author)
 
-    def _begin(self, start: Pose | None) -> State:
+    def _begin(self, start: Pose | None, author: str = "") -> State:
         self._before = self._chain
         rng = np.random.default_rng((self.world.seed, self._episode))
         self._start = self._physics.random_pose(rng) if start is None else start
-        return self._report(self._physics.place(self._start), 0.0, 0.0, "")
+        return self._report(self._physics.place(self._start), 0.0, 0.0, author)
 
     def _report(self, motion: DriveResult, left: float, right: float, author: str) -> State:
         (x, y, heading), speed, turn, front, rear = motion

@@ -112,6 +112,8 @@ class SeatClient:
         self._ask_at = -math.inf
         self._moment = ("", -1)
         """Run and tick of the newest readings."""
+        self._named_at = math.inf
+        """The newest tick whose readings name this client; infinity before any do."""
         self._named: list[str] = []
         """Who was named the driver in them, the last one last."""
         self._driver: str | None = None
@@ -132,6 +134,7 @@ class SeatClient:
         self._note(readings, now)
         after = self._place.take(self._meaning(readings))
         if after is Place.DRIVING:
+            self._named_at = readings.tick
             if before is not Place.DRIVING:
                 self._has_driven = True
                 self.mode = "claim" if self.mode == "take over" else self.mode
@@ -184,7 +187,7 @@ class SeatClient:
         """Begin anew in another run."""
         self._place.take(Seen.RUN)
         self._known = self._has_driven = False
-        self._driver = None
+        self._driver, self._named_at = None, math.inf
 
     def learn(self, seen: Literal[Seen.APART, Seen.EQUAL, Seen.GAP], for_good: bool = False) -> None:
         """Take in how this client compares with the driver that it follows; `for_good`: and always will."""
@@ -211,12 +214,15 @@ class SeatClient:
         driver = readings.driver
         if driver == self.ident:
             return Seen.NAMED
-        if not driver:
-            return Seen.FREE
         waited = self.place in (Place.SEEKING, Place.QUEUED, Place.SUPERSEDED)
-        if waited and self._has_driven and self.mode != "stand by" and readings.author == driver:
+        if waited and self._has_driven and self.mode != "stand by" and self._succeeded(readings):
             return Seen.SUCCEEDED
-        return Seen.TAKEN
+        return Seen.TAKEN if driver else Seen.FREE
+
+    def _succeeded(self, readings: Readings | BatchReadings) -> bool:
+        """Whether another client has driven since this one did; it may be gone again, and nobody be named."""
+        later = readings.tick > self._named_at  # at that tick itself the author is our predecessor
+        return readings.author not in ("", self.ident) and (later or readings.author == readings.driver)
 
     def _seek(self, readings: Readings | BatchReadings, now: float) -> list[Effect]:
         """Ask where the mode wants it: a claim while nobody drives, everything else until the simulation knows.

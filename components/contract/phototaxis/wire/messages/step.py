@@ -39,7 +39,7 @@ class State(Message, kw_only=True):
     right: Motor
     """Command of the right wheel in the last control period, from −1 to 1 of full speed; 0 if none was applied."""
     author: Name
-    """Name of the agent that gave the last command; "" when an episode begins or the motors were stopped."""
+    """Name of the agent that gave the last command; "" when a run begins or the motors were stopped."""
     driver: Name
     """Name of the agent that holds the seat and must answer this tick; "" while the seat is free."""
     hash: str
