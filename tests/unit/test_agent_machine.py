@@ -218,7 +218,7 @@ def test_another_run_is_joined_with_what_was_learned(world):
     assert desk.journal == [b"s"]
     assert desk.machine.seat.place is Place.SEEKING
     assert digest(desk.checkpoint()) == learned
-    again = continued(desk.world, desk, desk.journal)
+    again = continued(desk.world, desk, desk.journal or [])
     again.read(Play(desk.world).readings(""))
     assert digest(again.checkpoint()) == learned, "one that is killed in the new run has lost nothing of the old one"
 
