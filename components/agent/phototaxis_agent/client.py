@@ -35,9 +35,9 @@ class AgentClient:
     keeps : whether checkpoints and a journal are wanted.
     mode, at : how the seat is sought, and from which tick on it is taken over.
 
-    Who waits for the seat of an agent of its own kind (the same learner and percept) inherits from it: a
-    standby at once, and then keeps in step with it; a taker-over when it sits down. Behind an agent of
-    another kind it learns from what that one does.
+    An agent that waits for the seat inherits from a driver of its own kind (the same learner and percept): a
+    standby inherits at once and then keeps in step with the driver; a taker-over inherits when it gets the seat.
+    Behind a driver of another kind, the agent learns from what that driver does.
 
     Raises
     ------

@@ -10,9 +10,9 @@ from phototaxis.runtime.seated import SeatedAgent
 from phototaxis.wire.messages import BatchReadings, CheckpointReply, CheckpointRequest, Readings
 
 INHERIT_WITHIN_S = 4.0
-"""How long a predecessor gets to hand over what it knows; so long a standby waits before it begins again."""
+"""Time that a predecessor gets to hand over its state, and that a standby waits before it asks again."""
 ASK_AGAIN_S = 0.5
-"""A question that is not answered by then may be lost, and is put once more; where nobody is, the answer is at once."""
+"""Pause before an unanswered question is repeated, since it may be lost; an absent agent is reported at once."""
 TAG = "inherit"
 
 Outcome = Literal["same kind", "another kind", "inherited", "nothing"]
@@ -77,9 +77,10 @@ class Following:
         return [self._asked._replace(timeout=left)] if left > 0 else []
 
     def predecessor_at(self, readings: Readings | BatchReadings) -> str:
-        """Whom to inherit from when we sit down: the author of the last command, who alone surely knows all before it.
+        """Name the agent to inherit from when we get the seat; "" if we drove last.
 
-        A driver that was named but has not driven has nothing of its own. "" for nobody: we have driven last.
+        The author of the last command has learned everything before it. A driver that was named but gave no command
+        has nothing of its own.
         """
         named, self._named = self._named, ""
         known = readings.author or named

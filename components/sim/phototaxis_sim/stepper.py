@@ -29,7 +29,7 @@ class Stepper:
     simulation : of one robot, or of many.
     pace : lockstep or real time.
     suffix : makes four hexadecimal digits for the name of a run that is begun by request.
-    found : where a killed simulation was; its simulation takes the place of the fresh one.
+    found : a run restored from the journal of a simulation that was killed; it replaces `simulation`.
     driver_timeout : seconds after which a silent driver loses the seat to whoever waits for it.
     """
 

@@ -26,10 +26,10 @@ class Steps:
 
     Attributes
     ----------
-    now : seconds of the clock, set by whoever calls.
-    out : the effects so far, taken by whoever calls.
-    held : the command of the present tick; None while it has not come.
-    heard_at : when the driver was last heard of, or sat down.
+    now : the present time in seconds; the caller sets it.
+    out : the effects so far; the caller takes them.
+    held : the driver's command for the present tick; None until it comes.
+    heard_at : the time of the driver's last command, or of the moment when it got the seat.
     """
 
     def __init__(self, simulation: Simulated, pace: Pace):
