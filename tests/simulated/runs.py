@@ -1,4 +1,4 @@
-"""Runs schedules, one or many at once, and says of each what became of it."""
+"""Runs schedules, one or many at once, and reports the result of each."""
 
 import gc
 import tempfile

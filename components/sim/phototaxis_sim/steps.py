@@ -134,7 +134,7 @@ class Steps:
             self.out.append(Publish("episode", self.simulation.ended))
 
     def ask(self) -> None:
-        """Ask the present tick of whoever drives now."""
+        """Ask the present driver for the command of the present tick."""
         driver = self.seat.driver
         waited = self.state is Phase.WAITING
         self.phase.take(Given.SEATED if driver else Given.VACATED)
@@ -159,7 +159,7 @@ class Steps:
             self._ended = ()
 
     def begin(self, simulation: Simulated) -> None:
-        """Go on with another run; who drives, drives on."""
+        """Begin another run; the driver keeps the seat."""
         self.out.append(Flush())
         self.simulation, self.held, self.lateness, self._ended = simulation, None, Lateness(), ()
         self.report.begin()
