@@ -160,7 +160,7 @@ def test_what_other_people_do_with_the_world_is_said(system, world):
     environment = gymnasium.make(NAME, connect="local", world=world, timeout=1.0)
     environment.reset(seed=5)
     assert phototaxis("control", "pause", "--name", world).returncode == 0
-    with pytest.raises(Error, match=f"it is paused; phototaxis control resume --name {world}"):
+    with pytest.raises(Error, match=f"it is paused; to continue: phototaxis control resume --name {world}"):
         environment.step(4)
     assert phototaxis("control", "resume", "--name", world).returncode == 0
     environment.step(4)
