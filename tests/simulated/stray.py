@@ -52,8 +52,8 @@ class Stray:
     def _of_another_author(self) -> tuple[str, Command | None]:
         """A command of a stranger, or of a former driver that is gone, for the newest tick."""
         heard = self._witness.published["state"]
-        here = {process.ident for process in self._network.processes}
-        gone = self._witness.former - here
+        here = {process.ident for process in self._network.processes} | {one.driver for one in heard[-1:]}
+        gone = self._witness.former - here  # the simulation may not know yet that its driver is gone
         return "command", self._forged(heard[-1].run, self._rng.choice(["stray", *sorted(gone)])) if heard else None
 
     def _forged(self, run: str, author: str) -> Command:

@@ -255,7 +255,7 @@ def running_mean(folder: Path) -> None:
         (running_mean, r"continuous through NormalizeObservation\? train through VecNormalize"),
         (
             lambda folder: save(MaskablePPO, folder, action="discrete"),
-            "policies of MaskablePPO are not supported: which",
+            "policies of MaskablePPO are not supported: they need",
         ),
     ],
 )
