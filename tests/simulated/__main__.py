@@ -19,9 +19,14 @@ from simulated.trace import Trace
 
 
 def main(words: list[str]) -> int:
-    first, _, last = (words[0] if words else "0:200").partition(":")
-    seeds = range(int(first), int(last) if last else int(first) + 1)
-    epochs = int(os.environ.get("EPOCHS", EPOCHS))
+    asked = words[0] if words else "0:200"
+    first, _, last = asked.partition(":")
+    try:
+        seeds = range(int(first), int(last) if last else int(first) + 1)
+        epochs = int(os.environ.get("EPOCHS", EPOCHS))
+    except ValueError as error:
+        print(f"expected SEEDS=FIRST or FIRST:LAST, got {asked}, and EPOCHS=N: {error}", file=sys.stderr)
+        return 2
     if os.environ.get("TRACE"):
         return _trace(seeds, epochs)
     covered = bool(os.environ.get("COVERAGE"))

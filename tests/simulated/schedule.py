@@ -80,7 +80,7 @@ def make(seed: int, epochs: int = EPOCHS) -> Schedule:
         double=rng.choice((0.0, 0.05, 0.3)),
         reorder=rng.choice((0.0, 0.05, 0.3)),
     )
-    if theme == "standby":  # who has missed readings when the driver dies cannot know what it has learned
+    if theme == "standby":  # a standby that missed readings cannot know what a dead driver learned from them
         weather.loss = weather.reorder = 0.0
     late = {role: rng.uniform(0, 1.5) for role in _PLACES if rng.random() < 0.1}
     faults = sorted((_fault(rng, theme, epochs) for _ in range(rng.randint(0, 8))), key=lambda fault: fault.tick)

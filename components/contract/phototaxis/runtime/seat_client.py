@@ -17,7 +17,7 @@ ASK_EVERY_S = 0.2
 """Pause between two questions when the first one was refused or lost."""
 RELEASE_WITHIN_S = 0.5
 MATCH_WITHIN_S = 5.0
-"""A standby gets so long to become the equal of a driver that drives or comes back; then it takes the seat as it is."""
+"""Time that a standby gets to become the driver's equal; after it, the standby takes a free seat as it is."""
 
 
 class Place(StrEnum):
@@ -93,13 +93,13 @@ class SeatClient:
     """Seeks the seat for one client, an agent's or a program's, and knows who holds it.
 
     It asks one question at a time, and asks again `ASK_EVERY_S` after one that was refused or not answered. A
-    simulation that comes back knows nothing of who waits, so it is asked anew.
+    restarted simulation does not know which clients wait, so the client asks it again.
 
     Parameters
     ----------
     ident : the client's name on the bus.
-    mode, at : how the seat is sought, and from which tick on it is taken over. Who has taken it over
-        once claims it from then on.
+    mode, at : how the seat is sought, and from which tick on it is taken over. A client that has taken
+        it over once claims it from then on.
     """
 
     def __init__(self, ident: str, mode: Mode = "claim", at: int = 0):
@@ -179,7 +179,7 @@ class SeatClient:
         self._has_driven, self.mode = True, "claim"
 
     def simulation_is_back(self) -> None:
-        """A simulation that has just come knows nothing of who waits for its seat, and anybody may sit down."""
+        """Forget what a simulation knew before it restarted: it may not know this client, and may seat another one."""
         self._known = False
         self._named.clear()
 
@@ -190,7 +190,7 @@ class SeatClient:
         self._driver, self._named_at = None, math.inf
 
     def learn(self, seen: Literal[Seen.APART, Seen.EQUAL, Seen.GAP], for_good: bool = False) -> None:
-        """Take in how this client compares with the driver that it follows; `for_good`: and always will."""
+        """Take in how this client compares with the driver that it follows; `for_good`: this will not change."""
         self._match_by = -math.inf if for_good else self._match_by
         self._place.take(seen)
 
