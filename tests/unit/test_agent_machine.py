@@ -453,6 +453,20 @@ def test_a_standby_is_the_drivers_equal_at_every_tick_and_drives_on(world):
     assert digest(heir.checkpoint()) == alone(world, play.simulation.state.tick)
 
 
+def test_a_standby_asks_nothing_of_a_former_leader_while_the_new_driver_has_not_driven(world):
+    driver, play = Desk(world), Play(world)
+    heir = Desk(world, mode="stand by", ident="b")
+    follow(world, play, driver, heir)
+    hand_over(driver, heir)
+    hand_over(driver, heir)
+    heir.read(play.readings("b"))  # the driver is gone
+    play.apply(heir.commands()[-1])
+    heir.now += 2 * INHERIT_WITHIN_S
+    asked = len(heir.asked)
+    heir.read(play.readings("c"))
+    assert [one.topic for one in heir.asked[asked:]] in ([], ["control"])
+
+
 def test_a_standby_that_missed_a_tick_inherits_again(world):
     driver, play = Desk(world), Play(world)
     heir = Desk(world, mode="stand by", ident="b")

@@ -154,8 +154,8 @@ class AgentClient:
         if fresh and seat.place is not Place.IN_STEP:
             self._wait(readings)
             return effects
-        stands_by = seat.mode == "stand by"
-        if stands_by and seat.place is not Place.IN_STEP and following.due(now) and not following.probes:
+        behind = seat.mode == "stand by" and following.leader == readings.driver  # a former leader may be gone
+        if behind and seat.place is not Place.IN_STEP and following.due(now) and not following.probes:
             self._wait(readings)
             return [*effects, *following.ask(following.leader, now, probe=following.related is None)]
         if seat.place in (Place.SHADOWING, Place.IN_STEP):
